@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 from .errors import AnalysisError, CaseError, StridorError
 
 if TYPE_CHECKING:
+    from . import case as case
     from . import view as plot
     from .app.page import app
     from .app.pipeline import report, run
@@ -64,6 +65,7 @@ _HOMES = {
     "app": ".app",
     "body_modes": ".study.analyses",
     "build_system": ".system",
+    "case": ".case",
     "compare": ".study.comparison",
     "cycles": ".study.cycles",
     "damping_map": ".study.damping_map",
@@ -95,6 +97,8 @@ _HOMES = {
     "summarise": ".study.analyses",
     "to_dataset": ".io.datasets",
 }
+
+_MODULES = ("app", "case", "plot")  # of _HOMES what is a module itself; the rest are names in one
 
 STARTED_NS = time_ns()  # sources written later are not those that this process runs
 __version__ = "0.1.0"
@@ -147,7 +151,7 @@ def __getattr__(name: str) -> Any:
     if home is None:
         raise AttributeError(f"module 'stridor' has no attribute {name!r}")
     module = import_module(home, __name__)
-    return module if name in ("plot", "app") else getattr(module, name)
+    return module if name in _MODULES else getattr(module, name)
 
 
 def __dir__() -> list[str]:

@@ -122,6 +122,132 @@ def test_a_block_of_less_than_nothing(section, tmp_path):
     assert "a block of -1" in message
 
 
+# -- counts -----------------------------------------------------------------------------------------------------------
+BLOCKS = """$MeshFormat
+4.1 0 8
+$EndMeshFormat
+$Nodes
+2 5 1 5
+2 1 0 3
+1
+2
+3
+0 0 0
+1 0 0
+1 1 0
+2 2 0 2
+4
+5
+0 1 0
+2 0 0
+$EndNodes
+$Elements
+2 4 1 4
+1 1 1 1
+1 1 2
+2 1 2 3
+2 1 2 3
+3 1 3 4
+4 2 5 3
+$EndElements
+"""
+MEND = "correct the number or the lines, or save the file from Gmsh again"
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "head", "said", "lines"),
+    [
+        (OLD, "5 2 0 0", "$Nodes", "5 nodes, and {} lines follow", 5),
+        (OLD, "3 2 2 1 1 2 5 3", "$Elements", "3 elements, and {} lines follow", 3),
+        (NEW, "5", "$Nodes", "5 nodes in 1 blocks, which are 11 lines, and {} lines follow", 11),
+        (NEW, "2 0 0", "$Nodes", "5 nodes in 1 blocks, which are 11 lines, and {} lines follow", 11),
+        (NEW, "3 2 5 3", "$Elements", "3 elements in 1 blocks, which are 4 lines, and {} lines follow", 4),
+        (BLOCKS, "3", "$Nodes", "5 nodes in 2 blocks, which are 12 lines, and {} lines follow", 12),
+        (BLOCKS, "1 1 2", "$Elements", "4 elements in 2 blocks, which are 6 lines, and {} lines follow", 6),
+        (BLOCKS, "3 1 3 4", "$Elements", "4 elements in 2 blocks, which are 6 lines, and {} lines follow", 6),
+    ],
+)
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_more_or_fewer_lines_than_their_count(text, line, head, said, lines, end, tmp_path):
+    """meshio stops at the count: the last elements were lost without a word."""
+    whole = text.split("\n")
+    at = whole.index(line)
+    for found, content in ((lines + 1, [*whole[:at], whole[at], *whole[at:]]), (lines - 1, whole[:at] + whole[at + 1 :])):
+        message = told(tmp_path / "a.msh", end.join(content))
+        first = content.index(head) + 1
+        assert message == f"a.msh, line {first + 1}: '{whole[first]}' – {head} says {said.format(found)}; {MEND}"
+
+
+@pytest.mark.parametrize(
+    ("text", "old", "new"),
+    [
+        (NEW, "\n1 5 1 5\n", "\n1 4 1 5\n"),  # of too many nodes meshio makes up the rest
+        (NEW, "\n1 5 1 5\n", "\n2 3 1 5\n"),
+        (BLOCKS, "\n2 1 0 3\n", "\n2 1 0 2\n"),
+        (BLOCKS, "\n2 4 1 4\n", "\n1 5 1 4\n"),
+        (BLOCKS, "\n2 1 2 3\n2", "\n2 1 2 2\n2"),
+        (BLOCKS, "\n1 1 1 1\n", "\n1 1 1 2\n"),
+    ],
+)
+def test_blocks_that_do_not_make_up_the_whole(text, old, new, tmp_path):
+    assert text.count(old) == 1
+    message = told(tmp_path / "a.msh", text.replace(old, new))
+    assert message.startswith("a.msh, line ")
+    assert message.endswith(f"; {MEND}")
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@pytest.mark.parametrize("text", [OLD, NEW, BLOCKS])
+def test_well_formed_files_are_read_as_before(text, end, tmp_path):
+    comments = "$Comments\nof the one\n1 2 3\nwho made it\n$EndComments\n"
+    written = {
+        "as it is": text,
+        "blank lines among nodes": text.replace("\n2 0 0", "\n\n2 0 0").replace("$EndNodes", "\n \n$EndNodes"),
+        "blank lines at the end": text.replace("$EndElements", "\n\n$EndElements") + "\n\n",
+        "comments before and between": comments + text.replace("$Elements", comments + "$Elements"),
+        "more sections": text + '$NodeData\n1\n"u"\n1\n0.0\n3\n0\n1\n5\n1 1\n2 1\n3 1\n4 1\n5 1\n$EndNodeData\n',
+        "no end": text.replace("$EndElements\n", ""),
+    }
+    if text is not OLD:  # numbers may be spread over lines in any way
+        written["in one line"] = text.replace("0 0 0\n1 0 0\n", "0 0 0 1 0 0\n").replace("1\n2\n3\n", "1 2 3\n")
+        written["blank lines among elements"] = text.replace("\n3 ", "\n\n3 ")
+    path = tmp_path / "a.msh"
+    expected = None
+    for what, content in written.items():
+        path.write_bytes(content.replace("\n", end).encode())
+        mesh = read_mesh(path)
+        expected = expected or mesh
+        assert mesh.cell_count == 3, what
+        np.testing.assert_array_equal(mesh.points, expected.points, err_msg=what)
+
+
+@pytest.mark.parametrize("form", ["gmsh22", "gmsh"])
+@pytest.mark.parametrize("section", ["Nodes", "Elements"])
+def test_binary_files_with_other_counts(form, section, tmp_path):
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0]])
+    mesh = meshio.Mesh(points, [("triangle", np.array([[0, 1, 2], [0, 2, 3]]))])
+    if form == "gmsh":
+        mesh.point_data["gmsh:dim_tags"] = np.array([[2, 1]] * 5)
+        mesh.cell_data |= {f"gmsh:{k}": [np.ones(2, dtype=int)] for k in ("geometrical", "physical")}
+    path = tmp_path / "a.msh"
+    mesh.write(path, file_format=form, binary=True)
+    data = path.read_bytes()
+    assert read_mesh(path).cell_count == 2
+    count = {"Nodes": 5, "Elements": 2}[section]
+    at = data.index(f"${section}\n".encode()) + len(section) + 2
+    for other in (count - 1, count + 1):
+        wrong = bytearray(data)
+        if form == "gmsh":  # blocks, and how many in all
+            wrong[at + 8 : at + 16] = np.uint64(other).tobytes()
+        else:
+            wrong[at : at + 1] = str(other).encode()
+        message = told(path, bytes(wrong))
+        assert message.startswith("mesh.file: ")
+        if form == "gmsh" or other < count:
+            assert f"says {other} {section.lower()} at ${section}" in message
+            assert message.endswith("save it from Gmsh again")
+
+
 @pytest.mark.parametrize("form", ["gmsh22", "gmsh"])
 @pytest.mark.parametrize("number", [-1, -5, 7])
 def test_binary_files(form, number, tmp_path):

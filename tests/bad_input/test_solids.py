@@ -570,7 +570,7 @@ LINKS = {
     "tie twice": (
         CONTACT,
         tie() + tie().replace("glue", "more"),
-        "ties.more: the node at (0.02, 0.01) m is tied also by ties.glue; a node can be slave once, leave it out of one of them",
+        "ties.more: says nothing that ties.glue does not say already; leave it out",
     ),
     "tie of what slides": (
         CONTACT,

@@ -17,7 +17,7 @@ from stridor.case import Case, loads, template_text
 from stridor.case.oddities import radians_meant
 from stridor.case.schema import ENTRIES
 from stridor.case.usual import USUAL, WITHOUT, usual_of
-from stridor.errors import CaseError
+from stridor.errors import AnalysisError, CaseError
 
 BENCH = loads(template_text("two-beams"))
 DISC = loads(template_text("pad-on-disc"), ["bodies.disc.mesh.divisions=[4,24,1]"])
@@ -370,6 +370,21 @@ def test_friction_beyond_all_bounds_ends_in_our_words(tmp_path: Any, capsys: pyt
     assert code != 0
     assert "no equilibrium" in err
     assert "Warning" not in err
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("stiffness", [1e-150, 1e-300, 1e-320])
+def test_a_contact_as_good_as_without_stiffness(stiffness: float) -> None:
+    """A beam that nothing else holds is loose, and one that a spring holds is not pressed."""
+    loose = SHORT.with_({"contacts.A.stiffness": stiffness})
+    spring = {"between": ("beam1.tip", "ground"), "stiffness": 1e4, "direction": (0.0, 1.0)}
+    held = loose.with_({"springs.k": spring})
+    for analysis in (st.steady_sliding, lambda case: st.modes(case, 0.1), st.onsets):
+        with pytest.raises(AnalysisError, match=r"can move freely under (its|the) loads"):
+            analysis(loose)
+    for analysis in (lambda case: st.modes(case, 0.1), st.onsets):
+        with pytest.raises(AnalysisError, match=r"no normal force|no contact carries load"):
+            analysis(held)
 
 
 def test_verbs_warn_of_friction_that_is_asked_for(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:

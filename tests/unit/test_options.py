@@ -177,6 +177,8 @@ def test_options_stand_for_settings_of_the_case(folder: Path) -> None:
         ("compare --only x", "--only: 'x' – "),
         ("cycles --seconds 0", "--seconds: 0.0 – a time > 0 [s]"),
         ("countermeasures --branch 5 --branch 6", "--branch: '5, 6' – one mode; without --branch all unstable ones"),
+        ("countermeasures --mu 0.1 --branch 1", "--branch: 1 – not an unstable branch, 8; without one all of these together"),
+        ("sensitivities --mu 0.1 --branch 0 --branch 9", "--branch: [0] – numbers of branches from 1 to "),
         ("onsets --along contacts.A.stiffness --between 1e9:1e11 --band 1:9", "--band: is not for onsets along "),
     ],
 )

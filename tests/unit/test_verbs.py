@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
+import sys
 import xml.etree.ElementTree as tree
 from collections.abc import Callable
 from pathlib import Path
@@ -71,6 +74,18 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_each_verb_is_looked_at() -> None:
     assert set(VERBS) | OTHERS == set(st.__all__)
+
+
+def test_modules_by_which_the_documentation_calls_are_there_at_once() -> None:
+    """`st.case` was there only once something else had imported it."""
+    root = Path(__file__).parents[2]
+    pages = [root / "README.md", *(root / "docs").glob("*.md"), *(root / "docs").glob("*.py"), *(root / "examples").glob("*.py")]
+    called = {name for page in pages for name in re.findall(r"\bst\.(\w+)\.\w+\(", page.read_text(encoding="utf-8"))}
+    assert {"case", "plot"} <= called
+    for name in sorted(called):
+        said = subprocess.run([sys.executable, "-c", f"import stridor as st; st.{name}"],
+                              capture_output=True, text=True, check=False)  # fmt: skip
+        assert said.returncode == 0, said.stderr
 
 
 @pytest.mark.parametrize("verb", sorted(VERBS))

@@ -252,6 +252,16 @@ def test_shapes_beside_each_other_agree_in_sign():
     assert tips[0] == pytest.approx(tips[1])
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("mu", [[0.1, 0.1], [0.0, 0.0, 0.0], [0.1]])
+def test_one_coefficient_several_times(mu):
+    found = sweep()
+    some = np.full(len(mu), 3)
+    modes = ComplexModes(np.array(mu), found.eigenvalues[some], found.branch, found.residual[some], found.damped)
+    for draw in (plots.frequency_branches, plots.growth_branches, plots.damping_branches, plots.root_locus):
+        draw(modes).savefig(io.BytesIO(), format="png", dpi=40)
+
+
 def test_unknown_branches_are_named():
     with pytest.raises(ValueError, match=r"branches \[7\]: not among those followed, 1 to 3"):
         plots.growth_branches(sweep(), (2, 7))

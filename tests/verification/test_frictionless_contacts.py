@@ -6,6 +6,7 @@ The truth is put together here, on dense matrices from the rows of the contacts:
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -233,8 +234,19 @@ def test_modes_without_a_coefficient_are_those_of_each_contact_s_own() -> None:
         assert sum(said in note for note in notes) == 1
     for notes in (found.notes, st.steady_sliding(case).warnings, st.onsets(with_friction()).notes):
         assert not any(said in note for note in notes)
-    with pytest.raises(CaseError, match="`modes`, `steady` and `simulate` without μ answer with each contact's own"):
-        st.compare(case, only=["growth"])
+    for refused in (lambda: st.compare(case, only=["growth"]), lambda: st.pencil(case)):
+        with pytest.raises(CaseError, match=r"name it .*`simulate` without μ answer with each contact's own"):
+            refused()
+
+
+def test_a_run_says_that_its_coefficient_takes_the_place_of_several(tmp_path: Path) -> None:
+    """In Python as the command line does, and in the file of the run."""
+    case = with_friction(back=0.1)
+    run = st.simulate(case, 0.4)
+    assert [note.startswith("μ stands for one friction coefficient of all contacts") for note in run.notes] == [True]
+    assert run.notes[0][:100] in run._repr_html_()
+    assert st.open(st.save(run, tmp_path / "run.nc")).notes == run.notes
+    assert st.simulate(case).notes == st.simulate(with_friction(), 0.4).notes == ()
 
 
 def test_onsets_along_the_friction_of_one_contact_leave_the_others_theirs() -> None:

@@ -224,4 +224,4 @@ def test_a_number_that_changes_nothing_is_told(tmp_path: Path) -> None:
 def test_branches_of_a_band_without_modes(tmp_path: Path) -> None:
     with pytest.raises(st.CaseError) as error:
         st.sensitivities(meeting(tmp_path), ["parameters.q.value"], modes=[1], max_frequency_hz=0.1)
-    assert str(error.value) == 'modes (--branch): [1] – "unstable", "all" or numbers of branches (the band has none)'
+    assert str(error.value) == 'modes: [1] – numbers of branches (the band has none)'

@@ -72,6 +72,25 @@ def test_constant_stress_passes_through(seed: int, dimension: int) -> None:
             assert moved == pytest.approx(solid.points * strain, abs=1e-9 * np.abs(strain).max() * SIZE.max())
 
 
+@pytest.mark.parametrize(("height", "uncovered"), [(0.0, 0), (5e-5, 0), (2e-4, 2), (2e-3, 2)])
+def test_slaves_whose_facets_the_master_does_not_cover_are_told(height: float, uncovered: int) -> None:
+    """By `check`, with modes and with runs, from one per cent of a facet on."""
+    slave = body("b", float(SIZE[0]), PLANE[0], [1, 4], "lumped")
+    top = [float(size) for size in SIZE[:2]]
+    wide = slave.replace(f"size = [{top[0]}, {top[1]}]", f"size = [{top[0]}, {top[1] + height}]")
+    assert (wide == slave) is (height == 0.0)
+    text = STEEL + body("a", 0.0, PLANE[0], [1, 3], "lumped") + wide + held(2) + tied("b") + "tolerance = 0.01\n"
+    case = loads(f'{text}[loads.pull]\nat = "b.right"\npressure = -1e5\n[[phases]]\nname = "a"\nduration = 1e-6\n')
+    said = () if not uncovered else (
+        f"ties.glue: {uncovered} of 5 slave nodes belong to facets that the master does not cover; each follows the point "
+        "below it, which passes no even stress where meshes differ",
+    )  # fmt: skip
+    assert st.build_system(case).tie_words == said
+    modes, run = st.modes(case, 0.0, max_frequency_hz=1e5), st.simulate(case)
+    for notes in (st.describe(case).warnings, modes.notes, run.notes):
+        assert [note for note in notes if note.startswith("ties.glue: ")] == list(said)
+
+
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("seed", range(4))
 def test_free_bodies_move_rigidly_without_force(seed: int, dimension: int) -> None:

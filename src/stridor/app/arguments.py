@@ -288,7 +288,8 @@ def _common(
 # Arguments of analyses that options of another name stand for.
 _STANDS_FOR = {
     "grid": "points", "max_frequency_hz": "max_frequency", "band_hz": "band", "numbers": "parameter",
-    "parameters": "parameter", "target": "branch", "modal.source": "source", "modal.solver": "solver",
+    "parameters": "parameter", "target": "branch", "modes": "branch",
+    "modal.source": "source", "modal.solver": "solver",
 }  # fmt: skip
 
 

@@ -87,6 +87,7 @@ def simulate(
 
     call.warn(decided_by_meshes(work.system(friction), friction))
     call.warn(() if friction is None else work.one_for_all)
+    call.warn(work.system(friction).tie_words)
 
     def checkpoint(part: Trajectory) -> None:
         try:

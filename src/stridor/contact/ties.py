@@ -207,7 +207,8 @@ def _claim(bond: Bond, number: int, owner: IntArray) -> BoolArray:
 def _check_again(
     bonds: Sequence[Bond], number: int, nodes: IntArray, transformation: Sparse, owner: IntArray
 ) -> None:
-    """Raise CaseError unless nodes of a bond that are tied already do by that what this bond says."""
+    """Raise CaseError unless nodes of a bond that are tied already do by that what this bond says, and where that is so
+    of all of them: the bond is there twice."""
     bond = bonds[number]
     keep = np.zeros(len(bond.slave), dtype=bool)
     keep[nodes] = True
@@ -216,14 +217,17 @@ def _check_again(
     said = sp.csr_array((value, (row, column)), shape=transformation.shape) @ transformation
     freedoms = np.unique(bond.slave)
     off = abs(sp.csr_array(said[freedoms] - transformation[freedoms])).max(axis=1).toarray().ravel() > SAME
-    wrong = np.isin(bond.slave, freedoms[off]).any(axis=1) | keep.all()  # a tie that says nothing new is a mistake
+    wrong = np.isin(bond.slave, freedoms[off]).any(axis=1)
     if wrong.any():
         node = int(np.argmax(wrong))
         at = ", ".join(f"{x:.6g}" for x in bond.tie.point[node])
         other = int(owner[bond.slave[node]].max())
-        by = f"also by {bonds[other].where}" if other != number else "twice"
-        accepted = f"the node at ({at}) m is tied {by}; a node can be slave once, leave it out of one of them"
-        raise CaseError(bond.where, None, accepted)
+        by = f"also by {bonds[other].where}, to something else" if other != number else "twice, to different places"
+        accepted = "a node may be slave of two ties only if both say the same of it, leave it out of one of them"
+        raise CaseError(bond.where, None, f"the node at ({at}) m is tied {by}; {accepted}")
+    if keep.all():  # a slip: copied, and not changed
+        others = ", ".join(bonds[k].where for k in np.unique(owner[bond.slave]))
+        raise CaseError(bond.where, None, f"says nothing that {others} does not say already; leave it out")
 
 
 def _positions(master: MasterSurface) -> Array:

@@ -1,4 +1,5 @@
-"""Numbers of nodes in Gmsh's files, looked through before a reader takes them for places in an array.
+"""Numbers of nodes in Gmsh's files, looked through before a reader takes them for places in an array, and how many
+there are against what the file says: a reader that stops at the count loses the rest without a word.
 
 Nodes are numbered from 1. A reader that subtracts 1 takes node 0 for the last one, and a number that two nodes have for
 the second of them; here the line is named instead (of binary files the element).
@@ -28,11 +29,13 @@ _SECTION = re.compile(rb"^\$(MeshFormat|Nodes|Elements)[ \t\r]*\n", re.MULTILINE
 _LARGEST = 2**31 - 1
 _SPARSE = 1000
 _ALWAYS = 10_000_000
+_MEND = "correct the number or the lines, or save the file from Gmsh again"
 
 
 def check_numbers(file: Path, where: str) -> None:
-    """Raise CaseError for nodes numbered below 1, twice or absurdly high, and for elements with a node that is not
-    there: at "FILE, line N" for text, at ``where`` for binary files. What is broken otherwise is left to the reader."""
+    """Raise CaseError for nodes numbered below 1, twice or absurdly high, for elements with a node that is not there,
+    and for more or fewer of them than the file says: at "FILE, line N" for text, at ``where`` for binary files. What is
+    broken otherwise is left to the reader."""
     data = file.read_bytes()
     sections = {found[1]: found.end() for found in reversed(list(_SECTION.finditer(data)))}
     if not {b"MeshFormat", b"Nodes", b"Elements"} <= set(sections):
@@ -44,7 +47,8 @@ def check_numbers(file: Path, where: str) -> None:
     if version.startswith(b"4.0"):
         raise CaseError(where, shown_path(file), "is of Gmsh's format 4.0; save it from Gmsh as 4.1 or 2.2")
     if binary:
-        _check_binary(file, where, data, sections, old=version.startswith(b"2"))
+        if words[2] == b"8":  # other sizes are the reader's to refuse
+            _check_binary(file, where, data, sections, old=version.startswith(b"2"))
     else:
         _check_text(file, data, sections, old=version.startswith(b"2"))
 
@@ -54,7 +58,7 @@ def _check_text(file: Path, data: bytes, sections: dict[bytes, int], *, old: boo
     known: set[int] = set()
     for section, take in ((b"Nodes", _take_node), (b"Elements", _take_element)):
         start = sections[section]
-        end = data.find(b"$End" + section, start)
+        end = data.find(b"$", start)  # no number has one
         lines = data[start : end if end >= 0 else len(data)].split(b"\n")
         number = data.count(b"\n", 0, start) + 1
 
@@ -62,43 +66,95 @@ def _check_text(file: Path, data: bytes, sections: dict[bytes, int], *, old: boo
             text = lines[offset].decode("latin-1").strip()
             raise CaseError(f"{file.name}, line {number + offset}", text, accepted)
 
+        nodes, closed = section == b"Nodes", end >= 0
         try:
-            rows = _rows_22(lines) if old else _rows_41(lines, refuse, nodes=section == b"Nodes")
+            rows = _rows_22(lines, refuse, nodes, closed) if old else _rows_41(lines, refuse, nodes, closed)
             for offset, words, kind in rows:
                 take(offset, words, kind, known, refuse)
         except (ValueError, IndexError):
             return  # the reader says what is no number
-        if section == b"Nodes" and known and (highest := max(known)) > max(_ALWAYS, _SPARSE * len(known)):
-            for offset, words, kind in _rows_22(lines) if old else _rows_41(lines, refuse, nodes=True):
-                if kind is not None and int(words[0]) == highest:
+        if nodes and known and (highest := max(known)) > max(_ALWAYS, _SPARSE * len(known)):
+            for offset, words, _ in rows:
+                if int(words[0]) == highest:
                     refuse(offset, f"node {highest} among {len(known)} nodes: number them closer to one another")
 
 
-Rows = list[tuple[int, list[bytes], int | None]]
+Rows = list[tuple[int, list[bytes], int]]
 Refuse = Callable[[int, str], NoReturn]
 
 
-def _rows_22(lines: list[bytes]) -> Rows:
-    """Lines of a section of format 2.2 with their offsets; kind: 0 for what is no head."""
-    return [(offset, line.split(), 0) for offset, line in enumerate(lines) if offset and line.strip()]
-
-
-def _rows_41(lines: list[bytes], refuse: Refuse, *, nodes: bool) -> Rows:
-    """Lines with numbers of nodes of format 4.1, with their offsets and types of elements."""
-    rows: Rows = []
-    held = [(offset, words) for offset, line in enumerate(lines) if (words := line.split())]
-    at = 1
-    while at < len(held):
-        count, kind = int(held[at][1][3]), int(held[at][1][2])
-        if count < 0:
-            refuse(held[at][0], f"a block of {count} {'nodes' if nodes else 'elements'}; there are none or some")
-        at += 1
-        rows += [(offset, words, 0 if nodes else -kind) for offset, words in held[at : at + count]]
-        at += count * (2 if nodes else 1)
+def _rows_22(lines: list[bytes], refuse: Refuse, nodes: bool, closed: bool) -> Rows:
+    """Lines of a section of format 2.2 with their offsets; kind: 0. Refuses more or fewer of them than its first one
+    says, fewer only where the section is closed: the reader says that a file breaks off."""
+    said = int(lines[0])
+    rows: Rows = [(offset, line.split(), 0) for offset, line in enumerate(lines) if offset and line.strip()]
+    if len(rows) > said or (closed and len(rows) < said):
+        what = "Nodes" if nodes else "Elements"
+        refuse(0, f"${what} says {said} {what.lower()}, and {len(rows)} lines follow; {_MEND}")
     return rows
 
 
-def _take_node(offset: int, words: list[bytes], kind: int | None, known: set[int], refuse: Refuse) -> None:
+def _rows_41(lines: list[bytes], refuse: Refuse, nodes: bool, closed: bool) -> Rows:
+    """Numbers of nodes of format 4.1, or of elements and their nodes, with their offsets and types of elements; none of
+    a file that breaks off. Refuses more or fewer of them than the first line of the section says."""
+    held = [(offset, words) for offset, line in enumerate(lines) if (words := line.split())]
+    (first, head), *follow = held
+    blocks, total = int(head[0]), int(head[1])
+    expected = blocks + (2 if nodes else 1) * total  # a node has a line for its number and one for its place
+    if len(follow) < expected and not closed:
+        return []
+    rows, found = _by_lines(follow, refuse, nodes)
+    if len(rows) != total or found != blocks:
+        rows, found = _by_numbers(follow, nodes)
+    if len(rows) == total and found == blocks:
+        return rows
+    what = "Nodes" if nodes else "Elements"
+    if len(follow) != expected:
+        ends = f"which are {expected} lines, and {len(follow)} lines follow"
+    else:
+        ends = "which the counts of its blocks do not make up"
+    refuse(first, f"${what} says {total} {what.lower()} in {blocks} blocks, {ends}; {_MEND}")
+
+
+def _by_lines(held: list[tuple[int, list[bytes]]], refuse: Refuse, nodes: bool) -> tuple[Rows, int]:
+    """Rows, and the number of blocks, where a head, a number, a place and an element have a line each; none where the
+    lines do not make up whole blocks."""
+    rows: Rows = []
+    at = blocks = 0
+    while at < len(held):
+        offset, head = held[at]
+        if len(head) != 4:
+            return [], -1
+        kind, count = int(head[2]), int(head[3])
+        if count < 0:
+            refuse(offset, f"a block of {count} {'nodes' if nodes else 'elements'}; there are none or some")
+        at, blocks = at + 1, blocks + 1
+        rows += [(offset, words, 0 if nodes else -kind) for offset, words in held[at : at + count]]
+        at += count * (2 if nodes else 1)
+    return (rows, blocks) if at == len(held) else ([], -1)
+
+
+def _by_numbers(held: list[tuple[int, list[bytes]]], nodes: bool) -> tuple[Rows, int]:
+    """The same where the numbers are spread over lines in any way, as readers take them."""
+    words = [(offset, word) for offset, line in held for word in line]
+    rows: Rows = []
+    at = blocks = 0
+    while at < len(words):
+        try:
+            kind, count = int(words[at + 2][1]), int(words[at + 3][1])
+        except (ValueError, IndexError):
+            return [], -1
+        if count < 0 or (not nodes and kind not in _NODES):
+            return [], -1
+        at, blocks = at + 4, blocks + 1
+        width = 1 if nodes else 1 + _NODES[kind]
+        for start in range(at, min(at + count * width, len(words)), width):
+            rows.append((words[start][0], [word for _, word in words[start : start + width]], 0 if nodes else -kind))
+        at += count * (4 if nodes else width)
+    return (rows, blocks) if at == len(words) else ([], -1)
+
+
+def _take_node(offset: int, words: list[bytes], kind: int, known: set[int], refuse: Refuse) -> None:
     del kind
     number = int(float(words[0])) if b"." in words[0] else int(words[0])
     if not 1 <= number <= _LARGEST:
@@ -108,7 +164,7 @@ def _take_node(offset: int, words: list[bytes], kind: int | None, known: set[int
     known.add(number)
 
 
-def _take_element(offset: int, words: list[bytes], kind: int | None, known: set[int], refuse: Refuse) -> None:
+def _take_element(offset: int, words: list[bytes], kind: int, known: set[int], refuse: Refuse) -> None:
     if kind:  # format 4.1: the element's number, then nodes
         first, needed = 1, _NODES.get(-kind)
     else:
@@ -124,14 +180,15 @@ def _take_element(offset: int, words: list[bytes], kind: int | None, known: set[
 
 def _check_binary(file: Path, where: str, data: bytes, sections: dict[bytes, int], *, old: bool) -> None:
     try:
-        nodes, elements = _binary_22(data, sections) if old else _binary_41(data, sections)
+        nodes, elements, text = _binary_22(data, sections) if old else _binary_41(data, sections)
     except (ValueError, IndexError, OverflowError):
         return  # the reader says that it breaks off
     if not len(nodes):
         return
     unique = np.unique(nodes)
-    text = ""
-    if unique[0] < 1 or unique[-1] > _LARGEST:
+    if text:
+        pass
+    elif unique[0] < 1 or unique[-1] > _LARGEST:
         text = f"has a node of number {unique[0] if unique[0] < 1 else unique[-1]}; they are numbered from 1"
     elif len(unique) < len(nodes):
         text = f"has {len(nodes) - len(unique)} nodes whose number another one has"
@@ -151,15 +208,26 @@ def _line_end(data: bytes, start: int) -> int:
     return data.index(b"\n", start) + 1
 
 
-def _binary_22(data: bytes, sections: dict[bytes, int]) -> tuple[IntArray, list[IntArray]]:
-    """Numbers of nodes, and of those of elements by blocks, in format 2.2."""
+def _binary_count(data: bytes, at: int, what: str, said: int, found: int) -> str:
+    """What is wrong with the count of a section whose blocks hold so many and end at ``at``; "" for nothing."""
+    mend = "save it from Gmsh again"
+    if found != said:
+        return f"says {said} {what.lower()} at ${what}, and its blocks hold {found}; {mend}"
+    if not data[at : at + 64].lstrip().startswith(b"$"):
+        return f"says {said} {what.lower()} at ${what}, and holds more before the section ends; {mend}"
+    return ""
+
+
+def _binary_22(data: bytes, sections: dict[bytes, int]) -> tuple[IntArray, list[IntArray], str]:
+    """Numbers of nodes, and of those of elements by blocks, in format 2.2; what is wrong with their counts."""
     start = sections[b"Nodes"]
     at = _line_end(data, start)
     record = np.dtype([("number", "i4"), ("place", "f8", (3,))])
     nodes = np.frombuffer(data, record, int(data[start:at]), at)["number"].astype(np.int64)
+    text = _binary_count(data, at + record.itemsize * len(nodes), "Nodes", len(nodes), len(nodes))
     start = sections[b"Elements"]
     at = _line_end(data, start)
-    left = int(data[start:at])
+    said = left = int(data[start:at])
     elements: list[IntArray] = []
     while left > 0:
         kind, count, tags = (int(n) for n in np.frombuffer(data, "i4", 3, at))
@@ -170,25 +238,28 @@ def _binary_22(data: bytes, sections: dict[bytes, int]) -> tuple[IntArray, list[
         elements.append(block[:, 1 + tags :].astype(np.int64))
         at += 12 + 4 * count * width
         left -= count
-    return nodes, elements
+    else:
+        text = text or _binary_count(data, at, "Elements", said, said - left)
+    return nodes, elements, text
 
 
-def _binary_41(data: bytes, sections: dict[bytes, int]) -> tuple[IntArray, list[IntArray]]:
+def _binary_41(data: bytes, sections: dict[bytes, int]) -> tuple[IntArray, list[IntArray], str]:
     """The same in format 4.1, whose sizes have 8 bytes."""
 
     def numbers(kind: str, count: int, at: int) -> Any:
         return np.frombuffer(data, kind, count, at)
 
     at = sections[b"Nodes"]
-    blocks = int(numbers("u8", 1, at)[0])
+    blocks, said = (int(n) for n in numbers("u8", 2, at))
     at += 32
     nodes: list[IntArray] = []
     for _ in range(blocks):
         count = int(numbers("u8", 1, at + 12)[0])
         nodes.append(numbers("u8", count, at + 20).astype(np.int64))
         at += 20 + 32 * count
+    text = _binary_count(data, at, "Nodes", said, sum(map(len, nodes)))
     at = sections[b"Elements"]
-    blocks = int(numbers("u8", 1, at)[0])
+    blocks, said = (int(n) for n in numbers("u8", 2, at))
     at += 32
     elements: list[IntArray] = []
     for _ in range(blocks):
@@ -198,4 +269,6 @@ def _binary_41(data: bytes, sections: dict[bytes, int]) -> tuple[IntArray, list[
             break
         elements.append(numbers("u8", count * width, at + 20).reshape(count, width)[:, 1:].astype(np.int64))
         at += 20 + 8 * count * width
-    return (np.concatenate(nodes) if nodes else np.zeros(0, dtype=np.int64)), elements
+    else:
+        text = text or _binary_count(data, at, "Elements", said, sum(map(len, elements)))
+    return (np.concatenate(nodes) if nodes else np.zeros(0, dtype=np.int64)), elements, text

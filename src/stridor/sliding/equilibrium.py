@@ -80,7 +80,8 @@ class Equilibrium:
         self.scale = float(np.abs(system.stiffness.data).max(initial=0.0)) or 1.0
         # Of Newton's step: contact with a cubic term has another compliance, and meets its force from another gap.
         self.compliance, self.gap = nodes.compliance, nodes.gap
-        self.condensed: BoolArray = nodes.compliance * self.scale * CONDENSED > 1.0
+        with np.errstate(over="ignore"):  # a contact as good as without stiffness: infinite is more than one
+            self.condensed: BoolArray = nodes.compliance * self.scale * CONDENSED > 1.0
         self.solved = 0
         cubic = system.cubic
         self.stretched: Array | float = 0.0 if cubic is None else cubic.stretch

@@ -22,6 +22,7 @@ from .redundant import closed, redundant
 
 ROUNDING = 1e-12  # of the largest force, and of the largest gap or way towards it
 SIGNS = 6  # times at most that forces of contacts kept closed change their sign
+SOFTEST = 1e150  # of a contact in the scaled matrix: as good as without stiffness, and far from an overflow
 LEAST = 0.2  # of the speeds: a mean velocity below that is no direction (a whole turning ring)
 
 
@@ -232,13 +233,15 @@ def _solve(system: System, force: Array, mu: Array, sense: Array, active: BoolAr
     push = normals + (mu * sense)[touching][:, None] * tangents
     # Multipliers are scaled to the stiffness so that the bordered matrix is well balanced.
     scale = float(np.abs(system.stiffness).max())
-    compliance = np.diag([c.compliance for c in contacts]) if contacts else np.zeros((0, 0))
+    with np.errstate(over="ignore"):
+        softness = np.array([c.compliance for c in contacts]) * scale * scale
+    softness = np.diag(np.minimum(softness, SOFTEST))
     right = np.concatenate([force, [-c.gap * scale for c in contacts]])
     with np.errstate(all="ignore"):
         bordered = sp.block_array(
             [
                 [system.stiffness, sp.csr_array(-push.T * scale)],
-                [sp.csr_array(normals * scale), sp.csr_array(compliance * scale * scale)],
+                [sp.csr_array(normals * scale), sp.csr_array(softness)],
             ],
             format="csc",
         )

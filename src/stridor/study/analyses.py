@@ -158,6 +158,7 @@ def _modes(
                 progress=progress, **asdict(options),
             )  # fmt: skip
             notes = taken_as_closed(system)
+        notes = (*notes, *system.tie_words)
     notes = (*notes, *(work.one_for_all if in_proportion is None else _said_of_own(work)))
     made = provenance(work, "modes", time.perf_counter() - started, damped=damped)
     return replace(result, notes=(*result.notes, *notes), provenance=made)
@@ -290,6 +291,7 @@ def found_onsets(
         held = work.system().touching(instead_of_own(work.system(), *between, solver=options.solver))
         result = solve_onsets(held, between, max_frequency_hz=max_frequency_hz, damped=damped, **asdict(options))
         notes = taken_as_closed(work.system())
+    notes = notes if work.varies else (*notes, *work.system().tie_words)
     return replace(result, notes=(*result.notes, *notes, *work.one_for_all))
 
 
@@ -323,6 +325,8 @@ def simulate(
     if work.given is not None:
         marks["fingerprint"] = fingerprint(work.given, mu)
     system, phases, settings = work.structured("simulate", mu), phases_of(work), settings_of(work)
+    if notes := [*(() if mu is None else work.one_for_all), *system.tie_words]:
+        marks["notes"] = notes
     require_pressed_in_time(work, system, "simulate")
     check_extent(work, system)
 
@@ -426,7 +430,7 @@ def compare(
         options=work.options,
     )
     by_meshes = (said for mu in chosen for said in decided_by_meshes(system, mu))
-    notes = dict.fromkeys((*result.notes, *work.one_for_all, *by_meshes))
+    notes = dict.fromkeys((*result.notes, *work.one_for_all, *system.tie_words, *by_meshes))
     seconds = time.perf_counter() - started
     return replace(result, notes=tuple(notes), provenance=provenance(work, "compare", seconds, mu=chosen))
 

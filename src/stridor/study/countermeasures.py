@@ -77,8 +77,8 @@ def rank_countermeasures(
         return Countermeasures(linear.mu, target, empty.astype(np.int64), empty + 0j, (), margin, told, source)
     target = target if target == "sum" else int(target)
     if target != "sum" and target not in linear.modes.branch[unstable]:
-        accepted = f'"sum", or an unstable branch: {", ".join(str(b) for b in linear.modes.branch[unstable])}'
-        raise CaseError("target", target, accepted)
+        branches = ", ".join(str(b) for b in linear.modes.branch[unstable])
+        raise CaseError("target", target, f"not an unstable branch, {branches}; without one all of these together")
     band = linear.columns("all") if watch == "all" else unstable
     ranking = Ranking(linear, [b for b in band if linear.mode(b) is not None], target, percent, margin)
     if not ranking.aimed.any():

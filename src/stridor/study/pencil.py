@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from ..errors import CaseError
 from ..modal.full.family import family_of
 from ..modal.quadratic import Quadratic
 from .asked import require_friction
@@ -16,13 +15,11 @@ def pencil(problem: Problem, mu: float | None = None, *, damped: bool | None = N
     `.matrices()` gives M, D and K (n, n) as SciPy arrays, `.backward_error(λ, x)` judges other pairs. Of rigid contacts
     that touch the normal forces are unknowns behind the displacements: rows without mass, with infinite eigenvalues.
     mu: None takes the problem's own coefficient; it scales every contact's law. damped: with all of D (None: as [modal]
-    says), else with its gyroscopic part alone. Raises CaseError for a μ that is none,
-    AnalysisError where there is no steady sliding.
+    says), else with its gyroscopic part alone. Raises CaseError for a μ that is none and for none where contacts have
+    different coefficients, AnalysisError where there is no steady sliding.
     """
     require_friction(mu)
     work = Workspace.of(problem)
-    mu = work.own_friction if mu is None else mu
-    if mu is None:
-        raise CaseError("mu", None, "missing – give the friction coefficient of all contacts")
+    mu = work.one_friction() if mu is None else mu
     damped = work.modal.damped if damped is None else damped
     return family_of(work.system, (mu, mu), work.options, damped=damped, own=mu, touching_at=mu).built(mu)

@@ -344,8 +344,9 @@ class Linearised:
         missing = [number for number in choice if number not in where]
         if missing or isinstance(choice, str):
             numbers = f"from 1 to {len(where)}" if where else "(the band has none)"
-            accepted = f'"unstable", "all" or numbers of branches {numbers}'
-            raise CaseError("modes (--branch)", missing or choice, accepted)
+            words = '"unstable", "all" or ' if isinstance(choice, str) else ""
+            accepted = f"{words}numbers of branches {numbers}"
+            raise CaseError("modes", missing or choice, accepted)
         return [where[number] for number in choice]
 
     def gap(self, column: int) -> float:

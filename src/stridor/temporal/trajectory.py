@@ -106,6 +106,11 @@ class Trajectory(Shown):
     provenance: dict[str, Any] = field(default_factory=dict)
     nodes: NodeHistory | None = None
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be known beside the numbers."""
+        return tuple(str(note) for note in self.provenance.get("notes", ()))
+
     def to_xarray(self) -> Any:
         """xarray.Dataset of all that was recorded, as `st.save` writes it."""
         return run_dataset(self)
@@ -133,7 +138,7 @@ class Trajectory(Shown):
             for name, c in p.contacts.items()
         ]  # fmt: skip
         cut = f"interrupted: {self.steps} of {self.planned_steps} steps" if self.interrupted else ""
-        lines = (cut, f"{len(self.time)} records every {self.sampling:g} s, path {self.path}")
+        lines = (cut, f"{len(self.time)} records every {self.sampling:g} s, path {self.path}", *self.notes)
         return html_table(f"Run of {self.steps} steps of {self.step:g} s", heads, rows, lines)
 
     @property

@@ -210,8 +210,9 @@ def _top(modes: ComplexModes, max_frequency_hz: float | None) -> float:
 
 def _friction_axis(ax: Axes, modes: ComplexModes) -> None:
     ax.set_xlabel(MU)
-    if len(modes.mu) > 1:
-        ax.set_xlim(float(modes.mu.min()), float(modes.mu.max()))
+    low, high = float(modes.mu.min()), float(modes.mu.max())
+    if low < high:  # of one coefficient, however often, there is no axis to cut
+        ax.set_xlim(low, high)
 
 
 def _mark_unstable(ax: Axes, mu: Array, values: Array, unstable: BoolArray) -> None:
