@@ -53,12 +53,26 @@ def random_problem(seed: int, *, small: bool = False) -> Problem:
 
 
 def _of_system(name: str, system: System, high: float, top: float, *, damped: bool) -> Problem:
-    truth = system if damped else system.undamped()
+    truth, high = system if damped else system.undamped(), min(high, 0.999 * determined_up_to(system))
     return Problem(
         name, 0.0, high, top,
         lambda _: onsets_of_band(system, (0.0, high), top / (2 * np.pi), damped=damped),
         lambda mu: full_eigenvalues(truth, mu),
     )  # fmt: skip
+
+
+def determined_up_to(system: System) -> float:
+    """The μ at which rigid contacts no longer determine the motion (Painlevé's paradox), dense: beyond it modes have no
+    meaning and are refused."""
+    rigid = [c for c in system.contacts if not np.isfinite(c.stiffness)]
+    if not rigid:
+        return np.inf
+    normals = np.array([c.normal_row for c in rigid])
+    rubs = np.array([-np.sign(c.tangent_lift.sum()) * c.tangent_row for c in rigid])
+    answer = np.linalg.solve(system.mass.toarray(), normals.T)
+    values = sl.eigvals(-rubs @ answer, normals @ answer)
+    real = values[(np.abs(values.imag) < 1e-7 * np.abs(values)) & (values.real > 0)].real
+    return float(1.0 / real.max()) if len(real) else np.inf
 
 
 def _beams(name: str, rng: np.random.Generator) -> Problem:

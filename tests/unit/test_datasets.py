@@ -203,3 +203,36 @@ def test_what_cannot_be_saved_or_opened(case: st.Case, tmp_path: Path) -> None:
     (tmp_path / "empty.npz").touch()
     with pytest.raises(st.CaseError, match=r"no reduced model; give a file of st\.save"):
         st.open(tmp_path / "empty.npz")
+
+
+@pytest.mark.parametrize(
+    ("stepper", "energies"), [("explicit", "half a step before the record"), ("implicit", "at the record")]
+)
+def test_runs_say_what_a_record_is(stepper: str, energies: str, tmp_path: Path) -> None:
+    """A mass thrown against a rigid stop: with implicit steps the record at which it hits has a force."""
+    stop = {
+        "normal": [1.0, 0.0], "tangent": [0.0, 1.0], "stiffness": 1e4 if stepper == "explicit" else "rigid", "gap": 0.1,
+        "friction": {"law": "coulomb", "coefficient": 0.3},
+    }  # fmt: skip
+    system = st.System.from_matrices(
+        np.eye(2), None, np.eye(2), contacts={"stop": stop}, loads={"down": np.array([-1.0, 0.0])}
+    )
+    steps = {"stepper": stepper, "step": 0.01, "record_every": 1, "initial": "rest"}
+    work = st.Workspace(
+        system, temporal=steps, phases=[{"name": "falls", "duration": 2.0}], modal={"max_frequency_hz": 1.0}
+    )
+    data = open_results(st.save(st.simulate(work), tmp_path / "simulate.nc"))
+    assert data["kinetic"].attrs["long_name"] == data["elastic"].attrs["long_name"] == energies
+    if stepper == "explicit":
+        assert "long_name" not in data["normal_force"].attrs
+        return
+    for name in ("normal_force", "tangential_force"):
+        assert data[name].attrs["long_name"].startswith("mean over the steps before and after the record")
+    assert data["gap"].attrs["long_name"] == data["slip_speed"].attrs["long_name"] == "at the record"
+    assert data["status"].attrs["long_name"] == "in the step after the record"
+    assert data["gap"].attrs["units"] == "m"
+    # That is so: the stop is hit within the step after the record, half of whose force is told at an open gap.
+    force, gap = data["normal_force"].values[:, 0], data["gap"].values[:, 0]
+    hit = int(np.flatnonzero(force > 0)[0])
+    assert gap[hit] > 1e-6 * gap[0]
+    assert data["status"].values[hit, 0] > 0

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import json
+import warnings
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 from benches import Slave, bench, by_hand, full_eigenvalues
 from stridor.errors import AnalysisError, CaseError
 from stridor.laws import Coulomb, StaticKinetic, Weakening
+from stridor.modal import checked_modes
 from stridor.modal.complex_modes import complex_modes
+from stridor.modal.growing import Growing
 from stridor.modal.onsets import onsets
+from stridor.modal.quadratic import Quadratic
 
 
 @pytest.mark.parametrize("mu", [-0.1, float("nan"), float("inf"), []])
@@ -96,3 +102,20 @@ def test_laws_scale_to_a_coefficient_and_their_slopes_are_derivatives(law):
         (law.sliding(0.03 + h) - law.sliding(0.03 - h)) / (2 * h), abs=1e-6
     )
     assert law.sliding(-0.03) == law.sliding(0.03)
+
+
+def test_a_mode_sharpened_beside_real_ones_keeps_its_imaginary_part(monkeypatch):
+    """Motions that only diverge are real; what one more step of inverse iteration gives has a phase of its own."""
+    problem = Quadratic(*(sp.csr_array(m) for m in (np.eye(2), np.zeros((2, 2)), np.diag([-4.0, 1.0]))))
+    phase = np.exp(1.2j)
+    monkeypatch.setattr(
+        checked_modes, "solved_beside",
+        lambda *_, **__: SimpleNamespace(lam=2.0 + 0j, right=phase * np.array([1.0, 0.0])),
+    )  # fmt: skip
+    rough = np.array([[1.0], [1e-5]])
+    found = Growing(0.0, np.array([2.0 + 0j]), rough, np.array([1e-4]), np.zeros(0), True, "", 10.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sharp = checked_modes._sharpened(problem, found, np.array([0]), None)
+    assert sharp.residual[0] < 1e-15
+    np.testing.assert_allclose(sharp.right[:, 0], phase * np.array([1.0, 0.0]), atol=1e-15)

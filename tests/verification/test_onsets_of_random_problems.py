@@ -11,6 +11,7 @@ import pytest
 
 import random_onsets
 from random_onsets import KINDS, disagreement, falling_problem, random_problem
+from stridor.errors import FollowingError
 from stridor.modal.full import branches, counted, full_onsets, search
 from stridor.modal.full.axis import _Walk
 from stridor.modal.onset import Onset, Onsets
@@ -114,8 +115,13 @@ def test_a_divergence_that_ends_just_before_a_pair_begins(tmp_path: Path) -> Non
     assert [(o.kind, o.roots) for o in close] == [("divergence", -1), ("flutter", 2)]
 
 
-def test_half_of_a_pair_that_comes_into_the_band_at_once(tmp_path: Path) -> None:
-    """A pair leaves the band, falls apart above it, and one half comes back faster than any mode moves."""
+def test_half_of_a_pair_that_comes_into_the_band_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pair leaves the band, falls apart above it, and one half comes back faster than any mode moves; counted."""
+
+    def unfollowed(*_: object, **__: object) -> None:
+        raise FollowingError("not asked for")
+
+    monkeypatch.setattr("stridor.modal.over_friction.onsets", unfollowed)
     problem = random_problem(1153)
     found = problem.solve(tmp_path)
     assert found.complete

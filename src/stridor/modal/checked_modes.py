@@ -124,7 +124,8 @@ def _with_columns(
 def _sharpened(problem: Quadratic, found: Growing, indices: IntArray, solver: str | None) -> Growing:
     """With the modes at these places (k,) as good as those that branches lead to: the search ends where backward errors
     are small, which leaves slow modes of stiff meshes right to eight digits."""
-    values, right, residual = found.values.copy(), found.right.copy(), found.residual.copy()
+    # What is sharpened has a phase of its own, where all that was found may be real.
+    values, right, residual = found.values.copy(), found.right.astype(complex), found.residual.copy()
     for k in indices:
         old = complex(values[k])
         solved = solved_beside(problem, old, None, None, solver=solver)

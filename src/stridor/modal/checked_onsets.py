@@ -8,16 +8,22 @@ from functools import partial
 
 import numpy as np
 
+from ..digits import hertz
 from ..errors import AnalysisError
 from ..system import System
 from ..typing import ComplexArray, IntArray
+from .between_ends import Between, between_ends, every_branch
 from .full.growth import growing_roots
 from .growing import CHECKED, UNCHECKED, WIDER, Growing, affordable, growing_modes, missing, too_large, unconfirmed
 from .joined import matched
 from .krylov import Carried
-from .onsets import Onsets, onsets
+from .onset import NOT_COMPLETE
+from .onsets import FOLLOW, Onsets, onsets
 from .options import Options
+from .results import grows
 from .tolerances import AT_REST
+
+MOST = 4  # that are named
 
 
 def checked_onsets(
@@ -36,8 +42,8 @@ def checked_onsets(
     found: as `onsets` gives them; where a mode grows in the band at the high end that branches do not lead to, they are
     solved again with branches from further above, from ``numbered_at`` on and with ``carried`` as in `onsets`. before:
     what the full problem has at the low end with the nodes that touch below it; where the branches say the same of this
-    side, nothing is sought there again. ``completeness`` says what came of it, ``at_start`` and ``at_end``
-    are what the full problem has.
+    side, nothing is sought there again. Of small systems a few μ between are looked at as well. ``completeness`` says
+    what came of it, ``at_start`` and ``at_end`` are what the full problem has.
     """
     options = options or Options()
     if not affordable(system):
@@ -50,9 +56,14 @@ def checked_onsets(
         end = high()
         start = _as_before(found, before, end.top) or low()
     except AnalysisError as error:
-        return replace(found, completeness=f"{UNCHECKED}: {error}.")
-    for wider in follow:
-        if not len(_unled(found, start, end)[1]) and not (found.unexplained or found.unbalanced):
+        said = f"{NOT_COMPLETE}: what grows at both ends was not found."
+        return replace(found, completeness=f"{said} {UNCHECKED}: {error}.")
+    between = between_ends(system, found, start, follow=FOLLOW, damped=damped, options=options)
+    for wider in (*follow, None):
+        amiss = len(_unled(found, start, end)[1]) or found.unexplained or found.unbalanced
+        if not (amiss or between.lacking):
+            break
+        if wider is None and (wider := every_branch(system, found, damped=damped, options=options)) is None:
             break
         try:
             found = onsets(
@@ -62,8 +73,9 @@ def checked_onsets(
             )  # fmt: skip
         except AnalysisError:
             break
-    values = (tuple(complex(v) for v in e.values) for e in (start, end))
-    return replace(found, at_start=next(values), at_end=next(values), completeness=_ends_sentence(found, start, end))
+        between = between_ends(system, found, start, follow=wider, damped=damped, options=options)
+    at_start, at_end = (tuple(complex(v) for v in e.values) for e in (start, end))
+    return replace(found, at_start=at_start, at_end=at_end, completeness=_sentence(found, start, end, between))
 
 
 def _as_before(found: Onsets, before: Sequence[complex] | None, top: float) -> Growing | None:
@@ -107,8 +119,8 @@ def _unled(found: Onsets, start: Growing, end: Growing) -> list[ComplexArray]:
     return result
 
 
-def _ends_sentence(found: Onsets, start: Growing, end: Growing) -> str:
-    """What the full problem says of both ends, beside the onsets."""
+def _sentence(found: Onsets, start: Growing, end: Growing, between: Between) -> str:
+    """What the full problem says of both ends, and between them, beside the onsets."""
     low, high = found.friction_range
     numbers = f"{start.words} at μ = {low:g} and {end.words} at μ = {high:g}, sought anew in the full problem"
     if not start.sought:
@@ -122,10 +134,10 @@ def _ends_sentence(found: Onsets, start: Growing, end: Growing) -> str:
         values = np.array(known, dtype=complex)
         extra = unconfirmed(growing, values, np.ones(len(values), dtype=bool))
         if len(lacking):
-            named = ", ".join(f"{v.imag / (2 * np.pi):.6g} Hz (+{v.real:.4g} 1/s)" for v in lacking[:4])
-            wrong.append(f"no branch was seen to lead to {named} at μ = {mu:g}")
+            wrong.append(_unled_words(lacking, mu))
         if extra:
             wrong.append(f"{extra} of the branches that grow at μ = {mu:g} are not found there")
+    wrong += [_unled_words(values, mu) for mu, values in between.lacking[:MOST]]
     if found.unexplained:
         wrong.append(f"{found.unexplained} of those at μ = {high:g} go back to no onset that was solved")
     if found.unbalanced:
@@ -135,15 +147,41 @@ def _ends_sentence(found: Onsets, start: Growing, end: Growing) -> str:
         )
     wrong += _roots_amiss(found, start, end)
     if wrong:
-        return f"NOT COMPLETE: {numbers}, but {'; '.join(wrong)}. Take a smaller range of μ."
+        return f"{NOT_COMPLETE}: {numbers}, but {'; '.join(wrong)}. Take a smaller range of μ."
     if not (start.complete and end.complete):
         sentence = start.sentence if not start.complete else end.sentence
-        return f"NOT COMPLETE: {numbers}, as the onsets say, but {sentence}"
+        return f"{NOT_COMPLETE}: {numbers}, as the onsets say, but {sentence}"
+    looked = f", which lead to all that grows at {between.looked} values between" if between.looked else ""
     return (
         f"{CHECKED} {'both ends' if start.sought else 'the high end'}: {numbers}, and each of them goes back to an "
-        f"onset listed or grew from the start. "
-        f"{end.sentence} What grows and ends again between them rests on the branches followed."
+        f"onset listed or grew from the start.{_left_words(found, start, end)}{_parted_words(found, start, end)} "
+        f"{end.sentence} What grows and ends again between them rests on the branches followed{looked}."
     )
+
+
+def _unled_words(values: ComplexArray, mu: float) -> str:
+    named = ", ".join(f"{v.imag / (2 * np.pi):.6g} Hz (+{v.real:.4g} 1/s)" for v in values[:MOST])
+    return f"no branch was seen to lead to {named} at μ = {mu:g}"
+
+
+def _left_words(found: Onsets, start: Growing, end: Growing) -> str:
+    """A sentence on modes that begin to grow at an onset listed and have left the band upwards by the high end."""
+    if found.followed is None:
+        return ""
+    limit, (numbers, values) = found.max_frequency_hz, found.followed[1]
+    beyond = grows(values, 0.0) & (values.imag > 2 * np.pi * limit)
+    last = {b: o for o in found.onsets for b in o.branches}
+    on = sum(b in last and not last[b].stabilising for b in numbers[beyond].tolist())
+    said = sum(o.roots for o in found.onsets) + 2 * len(found.entering)
+    ended = max((said - growing_roots(end.values) + growing_roots(start.values)) // 2 - on, 0)
+    told: list[str] = []
+    if on:
+        verb, they = ("has", "it grows") if on == 1 else ("have", "they grow")
+        high = found.friction_range[1]
+        told.append(f"{on} {verb} left the band upwards by then: at μ = {high:g} {they} on above {hertz(limit)}")
+    if ended:
+        told.append(f"{ended} {'has' if ended == 1 else 'have'} left the band upwards and ceased to grow beyond it")
+    return f" Of the growing modes {', and '.join(told)}." if told else ""
 
 
 def _roots_amiss(found: Onsets, start: Growing, end: Growing) -> list[str]:
@@ -158,3 +196,14 @@ def _roots_amiss(found: Onsets, start: Growing, end: Growing) -> list[str]:
         f"{more:+d} eigenvalues grow from one to the other where the onsets say {said:+d}: a motion that does not "
         "oscillate begins or ceases to grow, or a mode leaves the band"
     ]
+
+
+def _parted_words(found: Onsets, start: Growing, end: Growing) -> str:
+    """A sentence on growing pairs that have become two motions without oscillation, which no onset is of."""
+    if found.followed is None or any(o.enters_at is not None for o in found.onsets) or found.entering:
+        return ""
+    more = len(end.values) - len(start.values) - sum(-1 if o.stabilising else 1 for o in found.onsets)
+    if more <= 0 or np.count_nonzero(end.values.imag == 0.0) < 2 * more or _left_words(found, start, end):
+        return ""
+    pairs = "A growing pair has" if more == 1 else f"{more} growing pairs have"
+    return f" {pairs} parted into two motions{' each' if more > 1 else ''} that grow without oscillating."

@@ -12,6 +12,7 @@ from ..system import System
 from ..threads import one_thread
 from ..typing import Array
 from .options import Options
+from .painleve import refuse_undetermined
 from .results import UNSTABLE_RELATIVE, ComplexModes, Progress, grows
 from .source import ModesAsked, answered
 
@@ -54,6 +55,8 @@ def complex_modes(
     if values.ndim != 1 or not len(values) or not np.all(np.isfinite(values)) or np.any(values < 0):
         raise CaseError("mu", mu, "friction coefficients are numbers ≥ 0, at least one")
     options = Options(friction_damping, prestress, solver, source)
+    highest = float(values.max())
+    refuse_undetermined(system, highest, options, touching_at=highest if len(values) == 1 else None)
     asked = ModesAsked(
         max_frequency_hz, damped=damped, options=options, count=count, vectors=vectors, residuals=residuals,
         progress=progress, numbered_at=numbered_at,

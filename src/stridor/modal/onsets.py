@@ -10,6 +10,7 @@ from ..threads import one_thread
 from .krylov import Carried
 from .onset import Onset, Onsets
 from .options import Options
+from .painleve import refuse_undetermined
 from .source import ModesAsked, answered
 
 __all__ = ["Onset", "Onsets", "onsets"]
@@ -47,6 +48,7 @@ def onsets(
     if not (np.isfinite(max_frequency_hz) and max_frequency_hz > 0):
         raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
     options = Options(friction_damping, prestress, solver, source)
+    refuse_undetermined(system, high, options)
     asked = ModesAsked(
         max_frequency_hz, damped=damped, options=options, follow=follow, numbered_at=numbered_at, carried=carried
     )

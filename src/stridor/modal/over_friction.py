@@ -196,6 +196,8 @@ def _solved_onsets(
             )  # fmt: skip
         if found.complete or held.size > WHOLE or options.source is not None:
             return found
+        if UNCHECKED in found.completeness:  # what does not find the ends finds nothing between them
+            return found
         for why in ("", None):  # counted, and followed in the full problem: many that begin at once are not counted
             try:
                 other = unfollowed(held, between, why)

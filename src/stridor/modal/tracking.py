@@ -18,6 +18,7 @@ import scipy
 from ..errors import AnalysisError, FollowingError
 from ..typing import BoolArray, ComplexArray, IntArray
 from .meeting import beyond, continued, halves
+from .painleve import undetermined
 from .roots import ReceptanceProblem, dense_roots, frictionless_roots, polish
 
 CLOSE = 0.25  # a correction may be this fraction of the distance to the next root
@@ -144,11 +145,8 @@ class Tracker:
             if converged:
                 return RootState(mu, roots, implied, self._tangents(roots, mu), old.branch)
         if reach > 1e3 * self.limit and np.any(self.spectrum.coupling.compliance == 0.0):
-            raise AnalysisError(
-                f"an eigenvalue grows beyond all bounds at μ = {old.mu:.9g}: from there on rigid contact "
-                "with friction no longer determines the motion (Painlevé's paradox); stay below, or give the "
-                "contact a stiffness"
-            )
+            # Where the masses could not tell (`painleve`).
+            raise AnalysisError(undetermined(old.mu))
         raise FollowingError(
             f"branches cannot be told apart near μ = {old.mu:.9g}: three or more modes "
             "merge there; split the range or change a parameter slightly; `stridor modes --mu` solves each "

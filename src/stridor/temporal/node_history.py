@@ -27,7 +27,8 @@ class NodeHistory:
     time (r,) [s]; owner (m,) index into names; position (m, d) [m] in the reference configuration; area (m,) [m²],
     NaN for point contacts. normal_force (r, m) [N] in compression; tangential_force (r, m, d−1) [N] on the slave and
     slip_velocity (r, m, d−1) [m/s] of the slave relative to the master along the node's tangents (m, d−1, d);
-    gap (r, m) [m]; status (r, m) 0 separation, 1 stick, 2 slip.
+    gap (r, m) [m]; status (r, m) 0 separation, 1 stick, 2 slip. Of implicit steps forces are means over the steps
+    before and after the record, so that a node which opens or closes there may have one at an open gap.
     """
 
     names: tuple[str, ...]

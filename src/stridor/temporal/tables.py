@@ -15,6 +15,19 @@ if TYPE_CHECKING:
     from .trajectory import Trajectory
 
 STATUS = ("separation", "stick", "slip")
+AT = "at the record"
+HALF_BEFORE = {name: "half a step before the record" for name in ("kinetic", "elastic")}
+FORCE = "mean over the steps before and after the record; at the very first record over the step after it"
+# Implicit steps have impulses, where contact opens or closes within a step as well, and gaps at their ends.
+IMPLICIT = {
+    "normal_force": FORCE,
+    "tangential_force": FORCE,
+    "slip_speed": AT,
+    "gap": AT,
+    "status": "in the step after the record",
+    "kinetic": AT,
+    "elastic": AT,
+}
 
 
 def run_dataset(run: Trajectory) -> Any:
@@ -33,9 +46,12 @@ def run_dataset(run: Trajectory) -> Any:
         "displacement": (by_point, run.displacement, {"units": "m"}),
         "velocity": (by_point, run.velocity, {"units": "m/s"}),
         "acceleration": (by_point, run.acceleration, {"units": "m/s2"}),
-        "kinetic": ("time", run.kinetic, {"units": "J", "long_name": "half a step before the record"}),
-        "elastic": ("time", run.elastic, {"units": "J", "long_name": "half a step before the record"}),
+        "kinetic": ("time", run.kinetic, {"units": "J"}),
+        "elastic": ("time", run.elastic, {"units": "J"}),
     }
+    when = IMPLICIT if run.path == "implicit" else HALF_BEFORE
+    for name, words in when.items():
+        variables[name][2]["long_name"] = words
     for name, work in run.works.items():
         variables[f"work_{name}"] = ("time", work, {"units": "J"})
     for name, array in run.state.items():
@@ -45,7 +61,9 @@ def run_dataset(run: Trajectory) -> Any:
         for name, (dims, units) in NODE_FIELDS.items():
             values = getattr(run.nodes, name)
             small = np.int8 if name == "status" else values.dtype
-            variables[f"node_{name}"] = (dims, values.astype(small), {"units": units})
+            words = when.get("slip_speed" if name == "slip_velocity" else name)
+            told = {"units": units} if words is None else {"units": units, "long_name": words}
+            variables[f"node_{name}"] = (dims, values.astype(small), told)
         variables["node_time"] = ("node_time", run.nodes.time, {"units": "s"})
     axes = np.array(["x", "y", "z"][: run.displacement.shape[2]], dtype=object)
     coords = {

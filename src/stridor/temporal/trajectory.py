@@ -68,8 +68,10 @@ class Trajectory(Shown):
 
     time (r,) [s]; normal_force, tangential_force (r, m) [N], slip_speed (r, m) [m/s], gap (r, m) [m],
     status (r, m) 0 separation, 1 stick, 2 slip; displacement, velocity, acceleration (r, w, 2), absolute,
-    x and y. kinetic, elastic (r,) [J] half a step before each record; works by name (r,) [J] up to there:
-    damping, friction and contact count what is taken out, external and support what is put in.
+    x and y. Of implicit steps forces are means over the steps before and after a record, gaps and slip those at it, the
+    status that of the step after. kinetic, elastic (r,) [J] half a step before each record (implicit: at it); works by
+    name (r,) [J] up to there: damping, friction and contact count what is taken out, external and support what is put
+    in.
     sampling [s] between records; step Δt [s]; path modal, nodal or assembled; nodes histories of single contact nodes
     where the path keeps them; state everything a restart needs.
     """

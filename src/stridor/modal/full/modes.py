@@ -22,6 +22,7 @@ from ...errors import CaseError
 from ...system import System
 from ...typing import Array, ComplexArray
 from ..options import Options
+from ..painleve import refuse_undetermined
 from ..quadratic import band_modes, is_stiff
 from ..quadratic.dense import unit
 from ..quadratic.reach import searched
@@ -70,6 +71,9 @@ def full_modes(
         raise CaseError("mu", mu, "friction coefficients are numbers ≥ 0, at least one")
     if not (np.isfinite(max_frequency_hz) and max_frequency_hz > 0):
         raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
+    highest, held = float(values.max()), float(values.min()) if own is None else own
+    touching = highest if len(values) == 1 else held
+    refuse_undetermined(system_at(highest), highest, options or Options(), touching_at=touching)
     family = family_over(system_at, values, options or Options(), damped=damped, own=own)
     top = searched(family.built(float(values.max())), 2 * np.pi * max_frequency_hz)
     values, found, planned = modes_at_each(

@@ -12,6 +12,7 @@ from ...system import System
 from ...threads import one_thread
 from ..onset import Onsets
 from ..options import Options
+from ..painleve import refuse_undetermined
 from ..quadratic import RegionModes
 from ..quadratic.reach import searched
 from ..tolerances import AT_REST
@@ -50,6 +51,7 @@ def full_onsets(
         raise CaseError("friction_range", friction_range, "two numbers 0 ≤ a < b")
     if not (np.isfinite(max_frequency_hz) and max_frequency_hz > 0):
         raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
+    refuse_undetermined(system_at(high), high, options or Options(), touching_at=low if own is None else own)
     family = family_of(system_at, (low, high), options or Options(), damped=damped, own=low if own is None else own)
     state = family.contacts.contact_state
     result = Onsets((), (low, high), max_frequency_hz, family.dissipates, family.open_contacts, contact_state=state)

@@ -1,0 +1,105 @@
+"""What grows within a range of μ and no longer at its end, of small systems: branches must lead to it, too.
+
+A mode that starts far above the band may begin to grow there, come into it and cease to grow again, which neither end
+tells. Small systems cost next to nothing at a few μ between.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from ..errors import AnalysisError
+from ..system import System
+from ..typing import BoolArray, ComplexArray
+from .complex_modes import complex_modes
+from .full.growth import growing_roots
+from .growing import Growing, growing_modes, missing
+from .krylov.problem import ContactProblem, problem_of
+from .onset import Onsets
+from .options import Options
+from .quadratic.dense import all_modes
+from .tolerances import AT_REST, SPLIT_RELATIVE, UNSTABLE_RELATIVE
+
+SMALL = 40  # freedoms up to which a few μ between the ends are looked at
+INTERVALS = 12
+MARGIN = 1.01  # times the highest frequency: every branch
+
+
+@dataclass(frozen=True)
+class Between:
+    """How many μ were looked at, and growing modes (k,) to which no branch leads by the μ at which they were found."""
+
+    looked: int
+    lacking: tuple[tuple[float, ComplexArray], ...] = ()
+
+
+NOT_LOOKED = Between(0)
+
+
+def between_ends(
+    system: System, found: Onsets, start: Growing, *, follow: float, damped: bool, options: Options
+) -> Between:
+    """What grows in the band between the ends of the range of some onsets, held against branches that start up to
+    ``follow`` times the band wherever the onsets do not account for it."""
+    if system.size > SMALL:
+        return NOT_LOOKED
+    low, high = found.friction_range
+    inner = np.linspace(low, high, INTERVALS + 1)[1:-1].tolist()
+    try:
+        problem = problem_of(system if damped else system.undamped(), None, options)
+        differ = [mu for mu in inner if _growing_roots(problem, mu, start.top) != _said(found, start, mu)]
+        seen = (
+            growing_modes(system, mu, found.max_frequency_hz, touching_at=None, damped=damped, options=options)
+            for mu in differ
+        )
+        odd = [g for g in seen if growing_roots(g.values) != _said(found, start, g.mu)]
+        if not odd:
+            return Between(len(inner))
+        # The high end beside them: of one μ alone those nodes would touch that do so there.
+        modes = complex_modes(
+            system, [*(g.mu for g in odd), high], max_frequency_hz=follow * found.max_frequency_hz, damped=damped,
+            **asdict(options),
+        )  # fmt: skip
+    except AnalysisError:
+        return NOT_LOOKED
+    lacking = ((g.mu, _unled(g, modes.eigenvalues[row], modes.unstable[row])) for row, g in enumerate(odd))
+    return Between(len(inner), tuple((mu, values) for mu, values in lacking if len(values)))
+
+
+def every_branch(system: System, found: Onsets, *, damped: bool, options: Options) -> float | None:
+    """How many times the band all branches of a small system start at most; None of others."""
+    if system.size > SMALL:
+        return None
+    try:
+        problem = problem_of(system if damped else system.undamped(), None, options)
+        values = all_modes(problem.pencil(0.0).condensed())[0]
+    except AnalysisError:
+        return None
+    return MARGIN * float(np.abs(values).max(initial=0.0)) / (2 * np.pi * found.max_frequency_hz)
+
+
+def _said(found: Onsets, start: Growing, mu: float) -> int:
+    """How many eigenvalues grow in the band at μ by what grows at the low end and the onsets below it."""
+    passed = [o.roots for o in found.onsets if (o.mu if o.enters_at is None else o.enters_at) < mu]
+    return growing_roots(start.values) + sum(passed) + 2 * sum(at < mu for _, at in found.entering)
+
+
+def _growing_roots(problem: ContactProblem, mu: float, top: float) -> int:
+    """How many eigenvalues grow in the band up to top [1/s] at μ, as QZ leaves them."""
+    values = all_modes(problem.pencil(mu).condensed(), top)[0]
+    rounding = UNSTABLE_RELATIVE if problem.damped else SPLIT_RELATIVE
+    size = np.abs(values)
+    inside = (values.imag >= 0.0) & (values.imag <= top) & (size > AT_REST * top)
+    return growing_roots(values[inside & (values.real > rounding * size)])
+
+
+def _unled(growing: Growing, listed: ComplexArray, unstable: BoolArray) -> ComplexArray:
+    """Growing modes (k,) to which no branch leads. Of one that has fallen apart on the real axis the list has one half
+    alone."""
+    lacking = growing.values[missing(growing, listed, unstable)]
+    fallen = unstable & (listed.imag == 0.0) & (listed.real > AT_REST * growing.top)
+    if np.count_nonzero(lacking.imag == 0.0) <= np.count_nonzero(fallen):
+        lacking = lacking[lacking.imag != 0.0]
+    return lacking
