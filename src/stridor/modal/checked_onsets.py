@@ -17,7 +17,6 @@ from .joined import matched
 from .krylov import Carried
 from .onsets import Onsets, onsets
 from .options import Options
-from .tolerances import AT_REST
 
 
 def checked_onsets(
@@ -100,7 +99,7 @@ def _unled(found: Onsets, start: Growing, end: Growing) -> list[ComplexArray]:
         lacking = growing.values[_not_in(growing, known)]
         if whole and found.followed is not None:
             branches = found.followed[k][1]
-            fallen = (branches.imag == 0) & (branches.real > AT_REST * growing.top)
+            fallen = (branches.imag == 0) & (branches.real > growing.still)
             if np.count_nonzero(lacking.imag == 0) <= np.count_nonzero(fallen):
                 lacking = lacking[lacking.imag != 0]
         result.append(lacking)

@@ -5,16 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from ...typing import BoolArray, ComplexArray
+from ..at_rest import moving
 from ..results import off_rounding
-from ..tolerances import AT_REST, SPLIT_RELATIVE, UNSTABLE_RELATIVE
+from ..tolerances import SPLIT_RELATIVE, UNSTABLE_RELATIVE
 from .family import Family
 
 
-def unstable(family: Family, values: ComplexArray, top: float, still: float = AT_REST) -> BoolArray:
-    """Which grow beyond rounding (k,); motions as a whole, up to ``still`` of the highest frequency top [1/s], do not
-    count."""
+def unstable(family: Family, values: ComplexArray, top: float, still: float = 0.0) -> BoolArray:
+    """Which grow beyond rounding (k,); motions as a whole do not count, nor what is no faster than ``still`` of the
+    highest frequency top [1/s]."""
     rounding = SPLIT_RELATIVE if family.reversible else UNSTABLE_RELATIVE
-    return (values.real > rounding * np.abs(values)) & (np.abs(values) > still * top)
+    grows = (values.real > rounding * np.abs(values)) & (np.abs(values) > still * top)
+    grows[grows] = moving(values[grows], top, lambda: family.rest_limit(top))
+    return grows
 
 
 def without_rounding(family: Family, values: ComplexArray) -> ComplexArray:
