@@ -22,6 +22,8 @@ from .quadratic.problem import Quadratic
 from .tolerances import AT_REST
 
 DENSE = 600  # unknowns up to which all singular values are looked at
+SHARPER = 0.1  # of AT_REST: what methods for small matrices make of zero at most
+LOST = 1e-15  # of the square of the highest frequency: what solving for all modes up to there leaves of λ²
 RESISTED = 1e-12  # of the stiffness, each freedom in its own units: less than that may be rounding
 ROUNDED = 1e-13  # of entries: what sums of them, and files of fourteen digits, leave
 SLOW = 1e-3  # of the highest frequency: what is faster is never taken for rest
@@ -43,8 +45,26 @@ def rest_limit(problems: Sequence[Quadratic], top: float, solver: str | None = N
     for problem in problems:
         motions = _unresisted(problem, top, solver)
         if motions.shape[1]:
-            found = max(found, AT_REST * top, _rounding(problem, motions))
+            share = AT_REST if problem.size > DENSE else SHARPER * AT_REST
+            found = max(found, share * top, _rounding(problem, motions))
     return found
+
+
+def more_slow(problem: Quadratic, slow: ComplexArray, top: float) -> bool:
+    """Whether of eigenvalues (k,) that may be zero there are more than motions without stiffness make, of matrices so
+    small that these are counted."""
+    if not len(slow) or problem.size > DENSE:
+        return False
+    real = int(np.count_nonzero(slow.imag == 0.0))
+    # Rounding makes ±ε or ±jε of a double zero, and of the latter one is left unsaid.
+    return len(slow) - real + (real + 1) // 2 > _unresisted(problem, top, None).shape[1]
+
+
+def told_growth(values: ComplexArray, relative: float, top: float) -> Array:
+    """Growth rates (k,) [1/s] above which eigenvalues grow beyond rounding: a share of |λ|, and of slow ones what is
+    lost of them where all modes up to top [1/s] are solved for at once."""
+    size = np.maximum(np.abs(values), 1e-300)
+    return np.maximum(relative * size, LOST * top * (top / size))
 
 
 def _unresisted(problem: Quadratic, top: float, solver: str | None) -> Array:

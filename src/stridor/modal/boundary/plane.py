@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
-from ..at_rest import moving, rest_limit
+from ..at_rest import moving, rest_limit, told_growth
 from ..dense_problem import DenseProblem, combined
 from ..full.branches import ends_of
 from ..full.growth import growing_roots
@@ -97,7 +97,7 @@ class Plane:
         """How much of this grows."""
         lam = found.values
         rounding = SPLIT_RELATIVE if self.reversible else UNSTABLE_RELATIVE
-        grows = lam[(lam.real > rounding * np.abs(lam)) & self.moving(lam)]
+        grows = lam[(lam.real > told_growth(lam, rounding, self.top)) & self.moving(lam)]
         near = bool(np.any(np.abs(grows) > NEAR_TOP * self.top))
         return Count(len(grows), growing_roots(grows), not near)
 

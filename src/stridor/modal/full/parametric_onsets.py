@@ -253,7 +253,7 @@ def onsets_along(
     where = "" if model.keeps_all else "in the reduced model"
     left_out = len(onsets) < len(tried)
     said = sentence(line, answer, ends, top, parameter, line.value, where, left_out)
-    complete = answer.complete
+    complete = answer.vouched
     if left_out:
         lost = ", ".join(f"{line.value(o.mu):.6g} ({o.frequency_hz:.6g} Hz)" for o, found in tried if found is None)
         complete, said = False, f"Not confirmed in the full problem and left out: {parameter} = {lost}. {said}"

@@ -39,7 +39,7 @@ class CorrectedModes:
     residual (k,): the larger of both sides' componentwise backward errors there; scaled_residual (k,): as that of
     `ReducedModes`, but formed. error (k,): estimated of λ, relative,
     from the full residuals; passed (k,): whether that is below the model's bound. steps: how many corrections were
-    made. point, inside, still as in `ReducedModes`.
+    made. point, inside, still, top as in `ReducedModes`.
     """
 
     point: Mapping[str, float]
@@ -53,6 +53,7 @@ class CorrectedModes:
     steps: int
     inside: bool
     still: float = 0.0
+    top: float = 0.0
 
     @property
     def frequency_hz(self) -> Array:
@@ -67,7 +68,7 @@ class CorrectedModes:
     @property
     def unstable(self) -> BoolArray:
         """Which grow (k,), motions as a whole not among them."""
-        return growing(self.values, self.still)
+        return growing(self.values, self.still, self.top)
 
 
 class Corrector:
@@ -127,7 +128,7 @@ class Corrector:
         )
         return CorrectedModes(
             point, found.values, right, left, backward, np.maximum(*lengths), error, ~doubtful, made,
-            problem.inside(point), model.still(found.values),
+            problem.inside(point), model.still(found.values), model.searched,
         )  # fmt: skip
 
     def _extended(self, basis: Array, projected: Array, block: Array) -> tuple[Array, Array] | None:

@@ -24,7 +24,7 @@ from ...notebook import Shown, counted, html_table
 from ...tabular import MODE, Rows, Tabular, mode_cells
 from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
-from ..at_rest import moving, rest_limit
+from ..at_rest import more_slow, moving, rest_limit, told_growth
 from ..dense_problem import combined
 from ..quadratic.problem import Quadratic
 from ..quadratic.reach import searched_in
@@ -41,7 +41,7 @@ class ReducedModes(Tabular):
     """Modes at one point of the box: λ (k,) [1/s], residual (k,) of the full problem (scaled, both sides' larger one),
     error (k,) estimated of λ, relative; passed (k,): whether that is below the bound asked for. point: the values of
     the parameters; inside: whether they lie in the box. right, left (r, k) are the vectors on the basis. still
-    [1/s]: up to which |λ| they may be motions as a whole."""
+    [1/s]: up to which |λ| they may be motions as a whole; top [1/s]: up to where they were solved for."""
 
     point: Mapping[str, float]
     values: ComplexArray
@@ -52,6 +52,7 @@ class ReducedModes(Tabular):
     right: ComplexArray
     left: ComplexArray
     still: float = 0.0
+    top: float = 0.0
 
     def of(self, chosen: BoolArray) -> ReducedModes:
         """Some of them."""
@@ -96,7 +97,7 @@ class ReducedModes(Tabular):
     @property
     def unstable(self) -> BoolArray:
         """Which grow (k,), motions as a whole not among them: their λ is zero but for rounding."""
-        return growing(self.values, self.still)
+        return growing(self.values, self.still, self.top)
 
 
 @dataclass(frozen=True, repr=False)
@@ -148,6 +149,21 @@ class ReducedModel(Shown):
         """Up to which |λ| [1/s] modes λ (k,) of a point may be motions as a whole; 0 where none of them is slow."""
         return 0.0 if np.all(moving(values, self.searched, lambda: self._rest_limit)) else self._rest_limit
 
+    def hidden(self, modes: ReducedModes) -> str:
+        """What is to be said of slow modes at a point that may be motions as a whole; empty for nothing."""
+        slow = modes.values[np.abs(modes.values) <= modes.still]
+        if not more_slow(self._small(modes.point), slow, self.searched):
+            return ""
+        return (
+            f"there are modes below {modes.still / (2 * np.pi):.3g} Hz, which cannot be told from motions as a whole: "
+            "whether they grow is not said"
+        )
+
+    def hidden_at(self, points: Sequence[Mapping[str, float]]) -> tuple[str, ...]:
+        """The same of several points, once."""
+        told = (self.hidden(self.modes(point, judged=False)) for point in points)
+        return tuple(dict.fromkeys(words for words in told if words))[:1]
+
     @cached_property
     def _rest_limit(self) -> float:
         return rest_limit([self._small(point) for point in self.problem.sampled], self.searched)
@@ -171,7 +187,7 @@ class ReducedModel(Shown):
         unknown = np.full(len(found.values), np.nan)
         made = ReducedModes(
             point, found.values, unknown, unknown, np.zeros(len(unknown), dtype=bool), inside, found.right, found.left,
-            self.still(found.values),
+            self.still(found.values), self.searched,
         )  # fmt: skip
         return self._judged(made, matrices, factors) if judged else made
 
@@ -198,10 +214,9 @@ class ReducedModel(Shown):
         return replace(modes, residual=np.maximum(right, left), error=error, passed=error <= self.bound)
 
 
-def growing(values: ComplexArray, still: float) -> BoolArray:
-    """Which λ (k,) grow beyond rounding, those up to still [1/s] being motions as a whole."""
-    size = np.abs(values)
-    return (values.real > UNSTABLE_RELATIVE * size) & (size > still)
+def growing(values: ComplexArray, still: float, top: float) -> BoolArray:
+    """Which λ (k,) of modes up to top [1/s] grow beyond rounding, those up to still [1/s] being motions as a whole."""
+    return (values.real > told_growth(values, UNSTABLE_RELATIVE, top)) & (np.abs(values) > still)
 
 
 def sketched(sketch: Array, factors: Array, powers: Array, lam: ComplexArray, z: ComplexArray) -> Array:
