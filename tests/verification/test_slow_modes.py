@@ -108,7 +108,7 @@ class Apart:
         for (damping, stiffness, circulatory), size in zip(self.blocks, (1.0, self.slow), strict=True):
             n = len(damping)
             none, one = np.zeros((n, n)), np.eye(n)
-            lam: ComplexArray = np.linalg.eigvals(np.block([[none, one], [-stiffness - q * circulatory, -damping]]))
+            lam: ComplexArray = 0j + np.linalg.eigvals(np.block([[none, one], [-stiffness - q * circulatory, -damping]]))
             share = lam.real[np.abs(lam) > 1e-4 * size] / np.abs(lam[np.abs(lam) > 1e-4 * size])
             if np.any((share > 1e-9) & (share < 1e-5)):
                 return None
