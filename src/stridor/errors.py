@@ -45,6 +45,10 @@ class Problem:
         return f"{where}: {shown(self.given)} – {accepted}"
 
 
+class NotSlidingError(AnalysisError):
+    """Nothing slides along any contact, whatever the friction coefficient: no support was given a velocity."""
+
+
 class FollowingError(AnalysisError):
     """Branches of modes cannot be followed from μ = 0, or the basis that they are followed on does not settle: the
     eigenvalues at a μ do not depend on it."""

@@ -28,6 +28,9 @@ class Hill:
         assert np.all((p > 0.0) & (p < 1.0))
         return type("Found", (), {"values": np.array([self.rate(p) + 1j])})
 
+    def moving(self, values: Array) -> Array:
+        return np.ones(len(values), dtype=bool)
+
     def slopes(self, p: Array, found: Any) -> Array:
         return self.slope(p).reshape(2, 1).astype(complex)
 

@@ -111,6 +111,8 @@ def reduce(
             provenance=_source(origin),
         )  # fmt: skip
         points = found.to_json()
+        names = found.parameters
+        call.warn(model.hidden_at([dict(zip(names, at, strict=True)) for at in found.values.tolist()]))
         files += [call.keep(found, "reduced.nc"), call.tabulate(found, "reduced.csv")]
         files.append(call.draw(modes_at_points(found), "reduced.png"))
     confirm = kept_in(model) == "all"

@@ -20,7 +20,7 @@ from .krylov.problem import ContactProblem, problem_of
 from .onset import Onsets
 from .options import Options
 from .quadratic.dense import all_modes
-from .tolerances import AT_REST, SPLIT_RELATIVE, UNSTABLE_RELATIVE
+from .tolerances import SPLIT_RELATIVE, UNSTABLE_RELATIVE
 
 SMALL = 40  # freedoms up to which a few μ between the ends are looked at
 INTERVALS = 12
@@ -49,7 +49,7 @@ def between_ends(
     inner = np.linspace(low, high, INTERVALS + 1)[1:-1].tolist()
     try:
         problem = problem_of(system if damped else system.undamped(), None, options)
-        differ = [mu for mu in inner if _growing_roots(problem, mu, start.top) != _said(found, start, mu)]
+        differ = [mu for mu in inner if _growing_roots(problem, mu, start) != _said(found, start, mu)]
         seen = (
             growing_modes(system, mu, found.max_frequency_hz, touching_at=None, damped=damped, options=options)
             for mu in differ
@@ -86,12 +86,12 @@ def _said(found: Onsets, start: Growing, mu: float) -> int:
     return growing_roots(start.values) + sum(passed) + 2 * sum(at < mu for _, at in found.entering)
 
 
-def _growing_roots(problem: ContactProblem, mu: float, top: float) -> int:
-    """How many eigenvalues grow in the band up to top [1/s] at μ, as QZ leaves them."""
-    values = all_modes(problem.pencil(mu).condensed(), top)[0]
+def _growing_roots(problem: ContactProblem, mu: float, start: Growing) -> int:
+    """How many eigenvalues grow in the band at μ, as QZ leaves them; what may be at rest does not count."""
+    values = all_modes(problem.pencil(mu).condensed(), start.top)[0]
     rounding = UNSTABLE_RELATIVE if problem.damped else SPLIT_RELATIVE
     size = np.abs(values)
-    inside = (values.imag >= 0.0) & (values.imag <= top) & (size > AT_REST * top)
+    inside = (values.imag >= 0.0) & (values.imag <= start.top) & (size > start.still)
     return growing_roots(values[inside & (values.real > rounding * size)])
 
 
@@ -99,7 +99,7 @@ def _unled(growing: Growing, listed: ComplexArray, unstable: BoolArray) -> Compl
     """Growing modes (k,) to which no branch leads. Of one that has fallen apart on the real axis the list has one half
     alone."""
     lacking = growing.values[missing(growing, listed, unstable)]
-    fallen = unstable & (listed.imag == 0.0) & (listed.real > AT_REST * growing.top)
+    fallen = unstable & (listed.imag == 0.0) & (listed.real > growing.still)
     if np.count_nonzero(lacking.imag == 0.0) <= np.count_nonzero(fallen):
         lacking = lacking[lacking.imag != 0.0]
     return lacking

@@ -16,7 +16,6 @@ from .options import Options
 from .quadratic import Quadratic
 from .quadratic.inverse_iteration import solved_beside
 from .results import ComplexModes
-from .tolerances import AT_REST
 
 ROWS = 5  # friction coefficients up to which every one is checked, of more the ends and the case's own
 
@@ -180,8 +179,8 @@ def _sentence(
         said += f", {entered} of which start{'s' if entered == 1 else ''} above it at μ = 0"
     if alone:
         said += f", {alone} of which no branch from μ = 0 was seen to lead to"
-    if slow := int(np.count_nonzero(unstable & (np.abs(modes.eigenvalues[row]) <= AT_REST * found.top))):
-        said += f" (beside {slow} of the list below {AT_REST * found.top / (2 * np.pi):.3g} Hz, not sought there)"
+    if slow := int(np.count_nonzero(unstable & (np.abs(modes.eigenvalues[row]) <= found.still))):
+        said += f" (beside {slow} of the list below {found.still / (2 * np.pi):.3g} Hz, not sought there)"
     if fast := int(np.count_nonzero(unstable & (modes.growth_rate[row] > found.fastest))):
         said += f" (beside {fast} of the list with a growth above {found.fastest:.6g} 1/s, not sought there)"
     lead = "Checked" if found.complete else "NOT COMPLETE"

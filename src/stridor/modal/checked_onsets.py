@@ -21,7 +21,6 @@ from .onset import NOT_COMPLETE
 from .onsets import FOLLOW, Onsets, onsets
 from .options import Options
 from .results import grows
-from .tolerances import AT_REST
 
 MOST = 4  # that are named
 
@@ -112,7 +111,7 @@ def _unled(found: Onsets, start: Growing, end: Growing) -> list[ComplexArray]:
         lacking = growing.values[_not_in(growing, known)]
         if whole and found.followed is not None:
             branches = found.followed[k][1]
-            fallen = (branches.imag == 0) & (branches.real > AT_REST * growing.top)
+            fallen = (branches.imag == 0) & (branches.real > growing.still)
             if np.count_nonzero(lacking.imag == 0) <= np.count_nonzero(fallen):
                 lacking = lacking[lacking.imag != 0]
         result.append(lacking)

@@ -18,6 +18,7 @@ from ..stages import passing, stage
 from ..system import System
 from ..threads import one_thread
 from ..typing import Array, BoolArray, ComplexArray, IntArray
+from .at_rest import SLOW, rest_limit
 from .krylov.problem import problem_of
 from .krylov.shifted import standing_at
 from .onset import refuted
@@ -26,7 +27,7 @@ from .quadratic import Quadratic, band_modes, is_stiff
 from .quadratic.polish import pairs
 from .quadratic.problem import times
 from .quadratic.reach import searched
-from .tolerances import AT_REST, SPLIT_RELATIVE, UNSTABLE_RELATIVE
+from .tolerances import SPLIT_RELATIVE, UNSTABLE_RELATIVE
 
 AFFORDABLE = 60_000  # unknowns up to which the full problem is solved unasked
 BESIDE = 1e-3  # of the band: how much faster than that modes may decay that are looked at
@@ -44,7 +45,7 @@ class Growing:
     beside (l,): eigenvalues within rounding and a little below of the axis. complete: whether the search vouches for
     there being no other; sentence: what speaks for that. top [1/s]: how far the band had to be searched.
     fastest [1/s]: up to which growth it was. sought: whether it was; else these are branches, which agree with what
-    was found beside them.
+    was found beside them. still [1/s]: up to which |λ| eigenvalues may be motions as a whole.
     """
 
     mu: float
@@ -57,6 +58,7 @@ class Growing:
     top: float
     sought: bool = True
     fastest: float = np.inf
+    still: float = 0.0
 
     @property
     def words(self) -> str:
@@ -103,7 +105,8 @@ def _searched_for(
     found = band_modes(whole, top / (2 * np.pi), above=-BESIDE * top, stands=stands, solver=options.solver)
     size = np.abs(found.values)
     rounding = UNSTABLE_RELATIVE if problem.damped else SPLIT_RELATIVE
-    grows = (found.values.real > rounding * size) & (size > AT_REST * top)
+    limit = rest_limit([whole], top, options.solver) if np.any(size <= SLOW * top) else 0.0
+    grows = (found.values.real > rounding * size) & (size > limit)
     # Slow modes of stiff meshes are found to fewer digits: what one more correction would change is no growth.
     grows &= ~(found.values.real <= SURE * _correction(whole, found.values, found.right))
     right = found.right[: problem.size, grows]
@@ -117,6 +120,7 @@ def _searched_for(
         found.completeness.sentence,
         top,
         fastest=found.completeness.searched.re_max,
+        still=limit,
     )
 
 
@@ -157,7 +161,7 @@ def missing(found: Growing, listed: ComplexArray, unstable: BoolArray) -> IntArr
 def unconfirmed(found: Growing, listed: ComplexArray, unstable: BoolArray) -> int:
     """How many of the modes listed as unstable are none in the full problem."""
     mine, top = listed[unstable], found.top
-    mine = mine[(mine.real > SAME * np.abs(mine)) & (np.abs(mine) > AT_REST * top)]
+    mine = mine[(mine.real > SAME * np.abs(mine)) & (np.abs(mine) > found.still)]
     # On the very border of what was searched a mode may count on one side only.
     mine = mine[(mine.imag <= top * (1 - SAME)) & (mine.real <= found.fastest * (1 - SAME))]
     ours, _ = pairs(mine, found.values, NEAR * top)

@@ -71,11 +71,11 @@ class ComplexModes(Rates, Tabular):
 
     @property
     def _top(self) -> float:
-        """The highest angular frequency [1/s] that matters, which says what is none."""
-        if self.max_frequency_hz is not None:
-            return 2 * np.pi * self.max_frequency_hz
+        """The highest angular frequency [1/s] that matters, which says what is none: a band may reach far beyond the
+        fastest mode."""
         size = np.abs(self.eigenvalues)
-        return float(size[np.isfinite(size)].max(initial=0.0))
+        fastest = float(size[np.isfinite(size)].max(initial=0.0))
+        return fastest if self.max_frequency_hz is None else min(2 * np.pi * self.max_frequency_hz, fastest / LEAST)
 
     @property
     def in_band(self) -> BoolArray:

@@ -6,7 +6,8 @@ UNSTABLE_RELATIVE = 1e-9
 # Growth where nothing dissipates, of |λ|: modes that meet on the axis part as a square root, so that rounding of 1e-16
 # in the matrices is 1e-8 in Re λ.
 SPLIT_RELATIVE = 1e-7
-# |λ| of a motion as a whole, of the highest frequency asked for: what has no stiffness has λ = 0 as a double root.
+# |λ| of a motion as a whole, of the highest frequency looked at: what has no stiffness has λ = 0 as a double root. Only
+# where there is such a motion (`at_rest`): where all have a stiffness slow modes count as any other.
 AT_REST = 1e-5
 # Backward error of an eigenpair above which it is none: of matrices whose entries are known to eight digits.
 BELIEVED = 1e-8

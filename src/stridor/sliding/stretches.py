@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..errors import AnalysisError
+from ..errors import AnalysisError, NotSlidingError
 from ..system import System
 from ..typing import Array, BoolArray
 from .equilibrium import FEW
@@ -267,6 +267,8 @@ class _Equilibria:
     def _look(self, mu: float) -> _Look:
         try:
             found = self._solved(mu)
+        except NotSlidingError:
+            raise
         except AnalysisError as error:
             return _Look(mu, None, None, f"{error}; that is at μ = {mu:.6g}")
         return _Look(mu, _key(found), found)
@@ -356,6 +358,8 @@ class _Along(_Equilibria):
         try:
             system = self._system_at(mu).in_place()
             found = steady_nodes(system, mu if self._rubs else None, self._solver, guess=self._near(mu))
+        except NotSlidingError:
+            raise
         except AnalysisError as error:
             return _Look(mu, None, None, f"{error}; that is at {mu:.6g}")
         return _Look(mu, _key(found), found)

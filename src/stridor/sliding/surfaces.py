@@ -18,7 +18,7 @@ from ..contact.multipliers import OPEN, SLIP, STICK
 from ..contact.nodes import ContactNodes
 from ..digits import readable
 from ..direct import SingularMatrix
-from ..errors import AnalysisError
+from ..errors import AnalysisError, NotSlidingError
 from ..notebook import Shown, counted, html_table
 from ..stages import passing, stage
 from ..system import System
@@ -31,6 +31,7 @@ from .redundant import closed, redundant
 from .resultants import Balance, Resultant, balance, resultants
 
 ALL_TRIED = 5  # nodes of which it is looked whether other sets are in equilibrium as well
+PRESSED = 1e-12  # of the largest force on a freedom: contact forces no larger are rounding of it
 SIGN_CHANGES = 30
 STEADY = "steady sliding of nodes"
 
@@ -134,7 +135,10 @@ def steady_sliding_nodes(
     coefficient = nodes.friction_coefficients(speed) if mu is None else float(mu) * nodes.share
     slips = speed > STILL * float(speed.max(initial=0.0))
     if not slips.any():
-        _require_slip(nodes, slips, coefficient, np.ones(nodes.count, dtype=bool))
+        try:
+            _require_slip(nodes, slips, coefficient, np.ones(nodes.count, dtype=bool))
+        except AnalysisError as error:
+            raise NotSlidingError(str(error)) from error
     sense = np.where(slips[:, None], -slip / np.where(slips, speed, 1.0)[:, None], 0.0)
     force = external_force(system, load_factors) - system.motion.damping @ factors
     rubs = bool(np.any(coefficient[:, None] * sense))
@@ -171,7 +175,9 @@ def steady_sliding_nodes(
     touches = closed(state.active, state.gap, state.displacement)
     if twice := redundant(system, nodes, touches & (nodes.compliance == 0.0)):
         raise AnalysisError(twice)
-    active = state.active & ((state.normal_force > 0.0) | nodes.kept)
+    # What presses by rounding of other forces does not press.
+    least = PRESSED * float(np.abs(force).max(initial=0.0))
+    active = state.active & ((state.normal_force > least) | nodes.kept)
     _require_slip(nodes, slips, coefficient, active)  # a stop beside, which stays open, need not
     if nodes.count and not active.any() and held is None:
         raise AnalysisError(

@@ -76,7 +76,7 @@ class FrictionModels:
         found = model.modes(point)
         upper = found.values.imag >= 0
         lam, error = found.values[upper], found.error[upper]
-        row = modes_row(lam, numbered(anchors, found)[upper], keep.modes, model.frequency)
+        row = modes_row(lam, numbered(anchors, found)[upper], keep.modes, model.searched)
         near = np.abs(lam.real) <= np.maximum(SAFE * error, NEAR) * np.abs(lam)
         if not np.any(model.problem.powers == 1):
             # Without damping what is stable lies on the axis, but for rounding.

@@ -11,6 +11,7 @@ from ..case import Case
 from ..errors import AnalysisError, CaseError, Problem
 from ..modal.boundary import Plane
 from ..modal.parametric import ParametricProblem, ReducedModel
+from ..modal.quadratic.reach import searched_in
 from ..system import build_system
 from ..typing import Array
 from .damping_reduced import FRICTION, box_name
@@ -89,14 +90,15 @@ def _solved(case: Case, asked: BoundaryAsked, top: float) -> PlaneProblem:
         try:
             model = reduced_model(case, box, max_frequency_hz=top, bound=asked.bound, whole=False)
             notes = tuple(getattr(model.problem, "notes", ()))
-            return PlaneProblem(model.problem, names, model.projected, model.vectors, model, model.frequency, notes)
+            return PlaneProblem(model.problem, names, model.projected, model.vectors, model, model.searched, notes)
         except AnalysisError as error:
             if asked.method == "reduced" or freedoms > MOST:
                 raise
             why = (f"all is solved in the full problem, there is no reduced model: {error}",)
     whole = parametric_problem(case, box)
     terms = np.array([term.matrix.toarray() for term in whole.terms])
-    return PlaneProblem(whole, names, terms, None, None, 2 * np.pi * top, (*whole.notes, *why))
+    searched = searched_in([whole.at(point) for point in whole.sampled], 2 * np.pi * top)
+    return PlaneProblem(whole, names, terms, None, None, searched, (*whole.notes, *why))
 
 
 def plane_of(

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...errors import AnalysisError
 from ...typing import Array, ComplexArray
-from ..tolerances import AT_REST, UNSTABLE_RELATIVE
+from ..tolerances import UNSTABLE_RELATIVE
 from .plane import Plane
 
 STEPS = 12  # of one climb at most
@@ -64,8 +64,9 @@ def tops(plane: Plane, seen: Sequence[ModesAtPoint], mesh: float) -> Iterator[tu
     for number, here in enumerate(seen):
         near = [other for other in seen if other is not here and np.hypot(*(other.p - here.p)) <= NEIGHBOUR * mesh]
         steep = np.hypot(*here.slopes.real) * mesh
+        moves = plane.moving(here.values).tolist()
         for k, lam in enumerate(here.values.tolist()):
-            decays = lam.real < -UNSTABLE_RELATIVE * abs(lam) and abs(lam) > AT_REST * plane.top
+            decays = lam.real < -UNSTABLE_RELATIVE * abs(lam) and moves[k]
             if decays and steep[k] > FLAT * abs(lam.real) and not any(here.rises_to(k, other) for other in near):
                 found.append((-lam.real / abs(lam), number, k))
     for _, number, k in sorted(found):

@@ -25,7 +25,7 @@ AIMED = 0.3  # and is meant to
 HIT = 0.2  # of a step: how far from the prediction the point may lie
 ALIKE = 0.6  # |xᴴx'| of vectors of unit length from one point to the next
 OMEGA = 0.05  # of ω: how far from its prediction
-STILL = 1e-4  # of the highest frequency: ω below which flutter has come to rest
+STILL = 1e-3  # of the ranges: flutter that comes to rest nearer than that, and is followed no further, ends there
 MOST = 3000  # points
 LONG = 0.05  # pieces longer than that are halved in any case
 EVENLY = 0.02  # of its change: how far off ω may be in the middle of two points
@@ -94,8 +94,7 @@ def _march(plane: Plane, seed: CurvePoint, sense: int) -> tuple[list[CurvePoint]
             return found, "edge", False
         new = _next(plane, way)
         if new is None:
-            slow = way.spot.kind != "standstill" and way.spot.omega <= 100 * STILL * plane.top
-            return found, "zero frequency" if slow else "lost", False
+            return found, "zero frequency" if _stops(plane, way) else "lost", False
         if gone and _back(way, new, seed, start):
             return [*found, seed], "closed", True
         if new.omega > plane.top:
@@ -104,6 +103,16 @@ def _march(plane: Plane, seed: CurvePoint, sense: int) -> tuple[list[CurvePoint]
         found.append(new)
         way = _on(way, new)
     return found, "lost", False
+
+
+def _stops(plane: Plane, way: _MarchState) -> bool:
+    """Whether flutter comes to rest a little further on: ω² falls to zero there as a straight line, or is already no
+    more than that of a motion as a whole may be."""
+    spot = way.spot
+    if spot.kind == "standstill":
+        return False
+    falls = -float(spot.turn @ way.heading)
+    return spot.omega <= max(2 * STILL * falls, 10 * plane.rest_limit)
 
 
 def _at_top(plane: Plane, way: _MarchState, beyond: CurvePoint) -> CurvePoint:
@@ -175,7 +184,7 @@ def _corrected(plane: Plane, way: _MarchState, target: Array, direction: Array, 
     chord = plane.chord(target, direction, (-reach, reach))
     spot = way.spot
     omega = spot.omega + float(spot.turn @ (target - spot.p))
-    if spot.kind != "standstill" and omega <= STILL * plane.top:
+    if spot.kind != "standstill" and omega <= plane.rest_limit:
         return None
     return settled(plane, spot.kind, chord, omega, spot.right, spot.left)
 
@@ -196,7 +205,7 @@ def _follows(plane: Plane, way: _MarchState, new: CurvePoint) -> bool:
         return False
     if old.kind == "standstill":
         return _like(plane, old, new)
-    if new.omega <= STILL * plane.top:
+    if new.omega <= plane.rest_limit:
         return False
     omega = old.omega + float(old.turn @ step)
     return abs(new.omega - omega) <= OMEGA * max(old.omega, new.omega) and _like(plane, old, new)

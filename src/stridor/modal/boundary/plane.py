@@ -14,7 +14,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...threads import one_thread
-from ...typing import Array, ComplexArray
+from ...typing import Array, BoolArray, ComplexArray
+from ..at_rest import moving, rest_limit, told_growth
 from ..dense_problem import DenseProblem, combined
 from ..full.branches import ends_of
 from ..full.growth import growing_roots
@@ -25,7 +26,7 @@ from ..options import Options
 from ..parametric import Parameter, ParametricProblem, Term
 from ..parametric.dense import DenseModes, assembled, dense_modes, made_of
 from ..quadratic import Quadratic
-from ..tolerances import AT_REST, SPLIT_RELATIVE, UNSTABLE_RELATIVE
+from ..tolerances import SPLIT_RELATIVE, UNSTABLE_RELATIVE
 
 REACH = 1.0 + 1e-9
 NEAR_TOP = 0.98  # times the band: growing modes from there on may be about to leave it or have just come into it
@@ -96,9 +97,19 @@ class Plane:
         """How much of this grows."""
         lam = found.values
         rounding = SPLIT_RELATIVE if self.reversible else UNSTABLE_RELATIVE
-        grows = lam[(lam.real > rounding * np.abs(lam)) & (np.abs(lam) > AT_REST * self.top)]
+        grows = lam[(lam.real > told_growth(lam, rounding, self.top)) & self.moving(lam)]
         near = bool(np.any(np.abs(grows) > NEAR_TOP * self.top))
         return Count(len(grows), growing_roots(grows), not near)
+
+    def moving(self, values: ComplexArray) -> BoolArray:
+        """Which eigenvalues (k,) at some point are no motions as a whole."""
+        return moving(values, self.top, lambda: self.rest_limit)
+
+    @cached_property
+    def rest_limit(self) -> float:
+        """Up to which |λ| [1/s] eigenvalues may be motions as a whole; 0 where none is."""
+        corners = [np.array([x, y]) for x in (0.0, 0.5, 1.0) for y in (0.0, 0.5, 1.0)]
+        return rest_limit([Quadratic(*self.matrices(p)) for p in corners], self.top)
 
     def slopes(self, p: Array, found: DenseModes) -> ComplexArray:
         """∇λ (2, k) of modes at a point; not finite where λ is double."""

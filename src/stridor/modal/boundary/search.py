@@ -40,6 +40,7 @@ ASIDE = 1e-4  # how far beside a curve others are counted
 ON_CURVE = 1e-5  # how near to one that counts is taken to be on it
 AWAY = 0.07  # of the mesh: how far beside it is counted then
 TRIED = 3  # times, as another one may run through there
+SLOW = "there are slow modes that cannot be told from motions as a whole"
 EDGE = 1e-3  # of a line: crossings so near its ends may lie beyond them
 
 
@@ -175,7 +176,7 @@ class _CurveSearch:
             return
         inside = [o for o in answer.onsets if 2 * np.pi * o.frequency_hz <= self.plane.top]
         onsets = tuple((o.mu, 2 * np.pi * o.frequency_hz, o.roots) for o in inside)
-        line = OnsetLine(axis, value, onsets, answer.complete, answer.why)
+        line = OnsetLine(axis, value, onsets, answer.vouched, SLOW if answer.slow else answer.why)
         self.found.lines.append(line)
         for onset in inside:
             if not _pairs(line, crossings(self.found.drawn, *line.ends), self.tolerance, only=onset.mu):
@@ -254,6 +255,8 @@ class _CurveSearch:
         where between every two curves that cross it, and at even distances, as many roots grow as these say."""
         passed = crossings(self.found.drawn, *line.ends)
         pairs = _pairs(line, passed, self.tolerance)
+        if line.why == SLOW:
+            return line  # counts do not see it either
         if line.complete and len(pairs) == len(passed):
             return line
         places = [0.0, *(c.at for c in passed), 1.0]

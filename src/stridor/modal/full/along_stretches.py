@@ -15,7 +15,6 @@ import numpy as np
 from ...sliding.stretches import Stretch
 from ..joined import by_stretch, jumps
 from ..parametric import ReducedModel
-from ..parametric.model import growing
 from .parametric_onsets import ParametricOnset, ParametricOnsets
 
 
@@ -58,7 +57,7 @@ def _at_border(before: Part, after: Part, name: str) -> Iterator[ParametricOnset
     """Growth that begins or ends because other nodes touch."""
     value = before.stretch.high
     sides = [part.model.modes({name: value}, judged=False) for part in (before, after)]
-    grow = [side.values[growing(side.values, before.model.frequency)].tolist() for side in sides]
+    grow = [side.values[side.unstable].tolist() for side in sides]
     begins, ends = jumps(*grow)
     for found, side, part, stabilising in ((ends, sides[0], before, True), (begins, sides[1], after, False)):
         if not found:

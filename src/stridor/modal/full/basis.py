@@ -15,7 +15,8 @@ import scipy.sparse as sp
 
 from ...direct import SingularMatrix
 from ...errors import AnalysisError
-from ...typing import Array, ComplexArray, Sparse
+from ...typing import Array, BoolArray, ComplexArray, Sparse
+from ..at_rest import moving
 from ..dense_problem import DenseProblem, Eigenpairs, OverNumber, combined
 from ..krylov.follow import FOLLOWED
 from ..options import Options
@@ -24,7 +25,7 @@ from ..quadratic import Quadratic, Region, find_modes
 from ..quadratic.inverse_iteration import two_sided
 from ..quadratic.problem import times
 from ..results import off_rounding
-from ..tolerances import AT_REST, SPLIT_RELATIVE, UNSTABLE_RELATIVE
+from ..tolerances import SPLIT_RELATIVE, UNSTABLE_RELATIVE
 from .family import MU, ROLES, Family, Smooth
 from .opening import SIMPLE, Opening, told
 
@@ -54,7 +55,7 @@ class Along(OverNumber):
         least = len(self.eigenpairs(0.0).values)
         for t in (0.0, self.family.high - self.family.low):
             values = self.eigenpairs(t).values
-            least = min(least, double_zeros(values[np.abs(values) <= AT_REST * self.frequency]))
+            least = min(least, double_zeros(values[~self._moves(values)]))
         self.at_rest = least
         if least:
             self._known.clear()
@@ -62,6 +63,10 @@ class Along(OverNumber):
     def searched(self) -> Family:
         """The problem whose eigenpairs these are."""
         return self.family
+
+    def _moves(self, values: ComplexArray) -> BoolArray:
+        """Which eigenvalues (k,) are no motions as a whole."""
+        return moving(values, self.frequency, lambda: self.family.rest_limit(self.frequency))
 
     @cached_property
     def opened(self) -> tuple[Opening, ...]:
@@ -71,7 +76,7 @@ class Along(OverNumber):
             return ()
         searched, found, result = self.searched(), self.eigenpairs(0.0), list[Opening]()
         size = np.abs(found.values)
-        still = (found.values.real == 0) & (size > AT_REST * self.frequency) & (size <= FOLLOWED * self.frequency)
+        still = (found.values.real == 0) & self._moves(found.values) & (size <= FOLLOWED * self.frequency)
         for k in np.flatnonzero(still):
             if np.count_nonzero(np.abs(found.values - found.values[k]) <= SIMPLE * size[k]) > 1:
                 continue
@@ -109,7 +114,7 @@ class Along(OverNumber):
         """Without motions as a whole, where there are any at all μ."""
         if not self.at_rest:
             return found
-        kept = np.abs(found.values) > AT_REST * self.frequency
+        kept = self._moves(found.values)
         return Eigenpairs(
             found.mu, found.coordinate[kept], found.values[kept], found.right[:, kept], found.left[:, kept],
             found.tangents[kept], found.own,

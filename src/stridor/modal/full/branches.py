@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 
 from ...typing import ComplexArray
+from ..at_rest import moving
 from ..dense_problem import eigenvalues
 from ..krylov.exceptional import exceptional_point
 from ..krylov.follow import State
@@ -205,7 +206,8 @@ def _opening(source: Along, end: RegionModes, state: State, top: float) -> list[
     family = source.family
     values, change = end.values, family.slopes(family.low)
     problem = family.built(family.low)
-    on_axis = (np.abs(values.real) <= SPLIT_RELATIVE * np.abs(values)) & (np.abs(values) > AT_REST * top)
+    on_axis = np.abs(values.real) <= SPLIT_RELATIVE * np.abs(values)
+    on_axis &= moving(values, top, lambda: family.rest_limit(top))
     on_axis &= ~unstable(family, values, top)  # what grows already begins nowhere
     indices = np.flatnonzero(on_axis & (values.imag > 0))
     result: list[BranchOnset] = []

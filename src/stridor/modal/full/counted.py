@@ -20,7 +20,7 @@ from ..dense_problem import Eigenpairs
 from ..newton import Root, crossing, meeting, standstill
 from ..onset import Onset
 from ..quadratic.polish import pairs
-from ..tolerances import AT_REST, UNSTABLE_RELATIVE
+from ..tolerances import UNSTABLE_RELATIVE
 from .basis import Along
 from .family import Family
 from .foretold import SLOWEST, changes_within
@@ -166,9 +166,8 @@ def _hidden(found: Eigenpairs, t: float, opened: Sequence[Opening], top: float) 
 
 
 def _growing(source: Along, found: Eigenpairs, top: float) -> BoolArray:
-    # Where nothing moves as a whole what is slow is a divergence that has just begun.
-    still = AT_REST if source.at_rest else SLOWEST
-    return unstable(source.family, found.values, top, still) & (np.abs(found.values) <= top)
+    # What is slow and no motion as a whole is a divergence that has just begun, or slow flutter.
+    return unstable(source.family, found.values, top, SLOWEST) & (np.abs(found.values) <= top)
 
 
 class _Search:

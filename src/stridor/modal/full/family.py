@@ -23,6 +23,7 @@ from ...direct import factorise
 from ...errors import AnalysisError, CaseError
 from ...system import System
 from ...typing import Array, ComplexArray, IntArray, Sparse
+from ..at_rest import rest_limit
 from ..backward_error import common_pattern
 from ..krylov.problem import ContactProblem, problem_of
 from ..newton import Border, BorderedFactor
@@ -270,11 +271,19 @@ class Family(Smooth):
     def __init__(self, between: tuple[float, float], make: Callable[[float], Quadratic], options: Options) -> None:
         super().__init__(between, make)
         self.options = options
+        self._rest: dict[float, float] = {}
 
     @property
     def freedoms(self) -> int:
         """Number of freedoms n; the forces of rigid contacts are unknowns beyond them."""
         return self.size
+
+    def rest_limit(self, top: float) -> float:
+        """Up to which |λ| [1/s] eigenvalues may be motions as a whole, of a search up to top [1/s]; 0 where none is."""
+        if top not in self._rest:
+            ends = [self.built(mu) for mu in (self.low, self.high)]
+            self._rest[top] = rest_limit(ends, top, self.options.solver)
+        return self._rest[top]
 
     @cached_property
     def neutral(self) -> bool:

@@ -123,7 +123,7 @@ def _modes(family: SystemFamily, mu: float, top: float, *, left: bool) -> ModesA
     n = family.freedoms
     told = spectrum.completeness.sentence
     return ModesAtFriction(
-        without_rounding(family, spectrum.values),
+        without_rounding(family, spectrum.values, top),
         unit(spectrum.right[:n]),
         None if spectrum.left is None else unit(spectrum.left[:n]),
         spectrum.residual,

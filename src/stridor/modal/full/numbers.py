@@ -13,11 +13,11 @@ import numpy as np
 from ...errors import AnalysisError
 from ...threads import one_thread
 from ...typing import Array, ComplexArray, IntArray
+from ..at_rest import moving
 from ..krylov.follow import State
 from ..quadratic.polish import pairs
-from ..tolerances import AT_REST
 from .basis import DECAY, Along, along, double_zeros
-from .family import SystemFamily
+from .family import Family, SystemFamily
 from .follow import BEYOND, surely
 
 NEAR = 1e-4  # of the band: how far from its branch an eigenvalue may lie
@@ -38,7 +38,7 @@ def numbered(
     """Numbers of eigenvalues (k,) sorted by frequency at each of the friction coefficients ``mu``; 0 for those that say
     nothing new, of ±ε that rounding makes of a motion as a whole. unfollowed: why nothing is to be followed. source: of
     the eigenpairs that are followed, where there is one."""
-    plain = [_by_frequency(v, top) for v in values]
+    plain = [_by_frequency(family, v, top) for v in values]
     if not float(mu.max()) > 0:
         return BranchNumbers(plain, "")
     if family.low >= family.high:
@@ -54,17 +54,17 @@ def numbered(
     return BranchNumbers(plain, said)
 
 
-def _by_frequency(values: ComplexArray, top: float) -> IntArray:
-    rest = at_rest(values, top)
+def _by_frequency(family: SystemFamily, values: ComplexArray, top: float) -> IntArray:
+    rest = at_rest(family, values, top)
     of: IntArray = np.zeros(len(values), dtype=np.int64)
     of[rest[: double_zeros(values[rest])]] = 1
     of[np.setdiff1d(np.arange(len(values)), rest)] = 1
     return np.cumsum(of) * of
 
 
-def at_rest(values: ComplexArray, top: float) -> IntArray:
+def at_rest(family: Family, values: ComplexArray, top: float) -> IntArray:
     """Places of eigenvalues that are motions as a whole."""
-    return np.flatnonzero(np.abs(values) <= AT_REST * top)
+    return np.flatnonzero(~moving(values, top, lambda: family.rest_limit(top)))
 
 
 @one_thread
@@ -101,7 +101,7 @@ def _assign(
     source: Along, state: State, own: IntArray, values: ComplexArray, of: IntArray, top: float, most: int
 ) -> int:
     """Number the eigenvalues at one μ in place; returns the largest number used so far."""
-    still = at_rest(values, top) if source.at_rest else np.zeros(0, dtype=np.int64)
+    still = at_rest(source.family, values, top) if source.at_rest else np.zeros(0, dtype=np.int64)
     of[still[: source.at_rest]] = np.arange(1, len(still[: source.at_rest]) + 1)
     rest = np.setdiff1d(np.arange(len(values)), still)
     ours, theirs = pairs(values[rest], state.values, NEAR * top)

@@ -10,12 +10,12 @@ import numpy as np
 from ...errors import AnalysisError, CaseError
 from ...system import System
 from ...threads import one_thread
+from ..at_rest import moving
 from ..onset import Onsets
 from ..options import Options
 from ..painleve import refuse_undetermined
 from ..quadratic import RegionModes
 from ..quadratic.reach import searched
-from ..tolerances import AT_REST
 from .basis import Along, Projected, along, whole_or_raise
 from .branches import ends_of, whole_ends
 from .family import family_of
@@ -87,7 +87,7 @@ def _checked(source: Along, ends: tuple[RegionModes, RegionModes], top: float) -
     # The low end of the range need not be where following begins; the high end is the one that is furthest from it.
     at_high = source.eigenpairs(family.high - family.low).values
     known = ends[1].values[np.abs(ends[1].values) <= top]
-    known = known[np.abs(known) > AT_REST * top]
+    known = known[moving(known, top, lambda: family.rest_limit(top))]
     distance = np.abs(known[:, None] - at_high).min(axis=1, initial=np.inf)
     if np.all(distance <= AGREES * np.abs(known)):
         return source

@@ -242,7 +242,7 @@ def onsets_along(
         raise CaseError("parameter", parameter, f"no such parameter{choice(parameter, names, 'there are')}")
     point = model.problem.point(fixed or {})
     line = of_model(model, parameter, point)
-    top = model.frequency
+    top = model.searched
     source = OnTerms(line, top, model.projected)
     source.find_at_rest()
     ends = ends_of(line, 0.0, 1.0, top)
@@ -253,7 +253,7 @@ def onsets_along(
     where = "" if model.keeps_all else "in the reduced model"
     left_out = len(onsets) < len(tried)
     said = sentence(line, answer, ends, top, parameter, line.value, where, left_out)
-    complete = answer.complete
+    complete = answer.vouched
     if left_out:
         lost = ", ".join(f"{line.value(o.mu):.6g} ({o.frequency_hz:.6g} Hz)" for o, found in tried if found is None)
         complete, said = False, f"Not confirmed in the full problem and left out: {parameter} = {lost}. {said}"
@@ -291,7 +291,7 @@ def _confirmed(model: ReducedModel, source: OnTerms, full: ParameterLine, onset:
     x, y = (combined(model.vectors, v[:, None])[:, 0].astype(complex) for v in (right, left))
     between = max(s - NEAR, 0.0), min(s + NEAR, 1.0)
     for root in _roots(full, s, lam, x, y, between, onset):
-        near = root is not None and abs(root.lam - lam) <= NEAR * max(abs(lam), 1e-3 * model.frequency)
+        near = root is not None and abs(root.lam - lam) <= NEAR * max(abs(lam), 1e-3 * model.searched)
         if near and root is not None and turns(root) == onset.stabilising:
             return _of(full, onset, root)
     return None

@@ -30,17 +30,20 @@ def located(source: Along, passage: Passage) -> tuple[Root, float] | None:
     slack = 0.05 * (passage.high - passage.low)
     for t, lam, x, y in _guesses(source, passage):
         mu = family.low + t
-        if passage.kind == "divergence" or abs(lam) <= AT_REST * source.frequency:
+        still, slow = passage.kind == "divergence", abs(lam) <= AT_REST * source.frequency
+        if still or (slow and abs(lam) <= family.rest_limit(source.frequency)):
             root = standstill(family, mu, x, y, between)
         elif passage.kind == "meeting":
             root = meeting(family, mu, lam, x, y, between)
         else:
             # Modes that nothing damps may meet on the axis beside others that are damped.
             root = crossing(family, mu, lam, x, y, between) or meeting(family, mu, lam, x, y, between)
+            if root is None and slow:
+                root = standstill(family, mu, x, y, between)
         if root is None or not between[0] - slack <= root.mu <= between[1] + slack:
             continue
         ends = root.slope < 0 if root.slope is not None else (root.square or 0.0) < 0
-        near = max(0.05 * abs(lam), AT_REST * source.frequency)
+        near = max(0.05 * abs(lam), AT_REST * source.frequency if still or root.lam == 0 else 0.0)
         if ends == passage.stabilising and abs(root.lam.imag - lam.imag) <= near:
             return root, t
     return None

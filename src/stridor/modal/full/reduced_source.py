@@ -79,7 +79,7 @@ def reduced_onsets(
     return Onsets(
         answer.onsets, (low, high), max_frequency_hz, family.dissipates, family.open_contacts, at_start=at_start,
         at_end=at_end, contact_state=family.contacts.contact_state,
-        unexplained=0 if answer.complete else max(len(answer.lacks), 1),
+        unexplained=0 if answer.vouched else max(len(answer.lacks), 1),
     )  # fmt: skip
 
 
@@ -122,4 +122,4 @@ def _confirmed(
         residual[k] = solved.residual(problem).max()
     order, n = np.lexsort((lam.real, lam.imag)), family.freedoms
     lam, right, left = lam[order], unit(right[:n, order]), unit(left[:n, order])
-    return ModesAtFriction(without_rounding(family, lam), right, left, residual[order], "")
+    return ModesAtFriction(without_rounding(family, lam, top), right, left, residual[order], "")

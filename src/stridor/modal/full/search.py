@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import AnalysisError
+from ..at_rest import more_slow, moving
 from ..onset import Onset
 from ..quadratic import RegionModes
 from .axis import walked
@@ -42,7 +43,8 @@ class Answer:
     way: the branches, where following them led to all. seen: what was counted instead; lacks: where that and the
     onsets differ. why: what kept branches from being followed, if anything did. walked: at how many ω the imaginary
     axis was looked at, where that led to the onsets (`axis`). values: at how many μ the onsets of followed branches
-    were held against a count.
+    were held against a count. slow [1/s]: up to which |λ| modes at the ends cannot be told from motions as a whole,
+    where there are more of them than such motions.
     """
 
     onsets: tuple[Onset, ...]
@@ -53,6 +55,12 @@ class Answer:
     why: str = ""
     walked: int = 0
     values: int = 0
+    slow: float = 0.0
+
+    @property
+    def vouched(self) -> bool:
+        """Whether it is complete, and nothing hides among motions as a whole."""
+        return self.complete and not self.slow
 
     @property
     def passing(self) -> tuple[Passing, ...]:
@@ -81,6 +89,19 @@ def search(
     ends, found in the full problem. why: what keeps branches from being followed, where nothing is made. Raises
     AnalysisError where there is no source, nor one by full solves.
     """
+    answer = _searched(family, make, between, ends, top, why)
+    for mu, end in zip(between, ends, strict=True):
+        slow = end.values[~moving(end.values, top, lambda: family.rest_limit(top))]
+        if more_slow(family.built(mu), slow, top):
+            return replace(answer, slow=family.rest_limit(top))
+    return answer
+
+
+def _searched(
+    family: Family, make: Sequence[Callable[[], Along]], between: tuple[float, float],
+    ends: tuple[RegionModes, RegionModes], top: float, why: str,
+) -> Answer:  # fmt: skip
+    """See `search`."""
     source, best = None, None
     for number, way_to in enumerate(make):
         try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,6 +27,10 @@ def sentence(
     """What speaks for these onsets being all, or where they are not. name: of the parameter, value(μ) what it is there;
     top [1/s]: the end of the band; where: what was searched, if not the full problem; left_out: whether some of them
     are not listed, so that nothing listed is complete."""
+    if answer.slow:
+        faster = sentence(family, replace(answer, slow=0.0), ends, top, name, value, where, left_out)
+        slow = f"modes below {answer.slow / (2 * np.pi):.3g} Hz, which cannot be told from motions as a whole"
+        return f"Not complete: there are {slow}. Of faster ones: {faster}"
     first, last = (int(np.count_nonzero(unstable(family, end.values, top))) for end in ends)
     low, high = (f"{value(mu):g}" for mu in _between(family, answer))
     numbers = f"{_modes(first)} at {name} = {low} and {last} at {name} = {high}"

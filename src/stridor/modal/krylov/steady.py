@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from ...contact.multipliers import SLIP, STICK
 from ...contact.nodes import ContactNodes
-from ...errors import AnalysisError
+from ...errors import AnalysisError, NotSlidingError
 from ...sliding import (
     SurfaceSliding,
     friction_damping_matrix,
@@ -102,6 +102,8 @@ def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver
     if (system.loads or system.load_steps) and nodes.count:
         try:
             steady = steady_nodes(system, mu, solver)
+        except NotSlidingError:
+            raise  # at any μ
         except AnalysisError as error:
             at = "the case's own friction" if mu is None else f"μ = {mu:.6g}"
             raise AnalysisError(f"{error}; that is at {at}") from error

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..quadratic.reach import searched_in
 from .model import ReducedModel
 from .offline import static_operator
 from .problem import ParametricProblem
@@ -15,7 +16,8 @@ def all_freedoms(problem: ParametricProblem, max_frequency_hz: float, *, bound: 
     are those of the full problem."""
     frequency = 2 * np.pi * max_frequency_hz
     middle = problem.at(problem.reference)
-    _, scale = static_operator(middle.mass, middle.stiffness, frequency)
+    searched = searched_in([problem.at(point) for point in problem.sampled], frequency)
+    _, scale = static_operator(middle.mass, middle.stiffness, searched)
     terms = np.array([term.matrix.toarray() for term in problem.terms])
     rows = scale[:, None]
     right, left = rows * terms, rows * terms.transpose(0, 2, 1)

@@ -39,7 +39,7 @@ class CorrectedModes:
     residual (k,): the larger of both sides' componentwise backward errors there; scaled_residual (k,): as that of
     `ReducedModes`, but formed. error (k,): estimated of λ, relative,
     from the full residuals; passed (k,): whether that is below the model's bound. steps: how many corrections were
-    made. point, inside, top as in `ReducedModes`.
+    made. point, inside, still, top as in `ReducedModes`.
     """
 
     point: Mapping[str, float]
@@ -52,6 +52,7 @@ class CorrectedModes:
     passed: BoolArray
     steps: int
     inside: bool
+    still: float = 0.0
     top: float = 0.0
 
     @property
@@ -67,7 +68,7 @@ class CorrectedModes:
     @property
     def unstable(self) -> BoolArray:
         """Which grow (k,), motions as a whole not among them."""
-        return growing(self.values, self.top)
+        return growing(self.values, self.still, self.top)
 
 
 class Corrector:
@@ -76,7 +77,7 @@ class Corrector:
 
     def __init__(self, model: ReducedModel, *, solver: str | None = None) -> None:
         self.model = model
-        operator, self._scale = static_operator(*symmetric_parts(model.problem), model.frequency)
+        operator, self._scale = static_operator(*symmetric_parts(model.problem), model.searched)
         self._factor: Factor = factorise(operator, symmetric=True, solver=solver)
 
     def free(self) -> None:
@@ -103,7 +104,7 @@ class Corrector:
         made = 0
         while True:
             matrices = assembled(projected, factors, powers)
-            found = dense_modes(*matrices, model.frequency, REACH, whole=model.whole)
+            found = dense_modes(*matrices, model.searched, REACH, whole=model.whole)
             right, left = combined(basis, found.right), combined(basis, found.left)
             rests = (
                 residual(problem, factors, found.values, right),
@@ -127,7 +128,7 @@ class Corrector:
         )
         return CorrectedModes(
             point, found.values, right, left, backward, np.maximum(*lengths), error, ~doubtful, made,
-            problem.inside(point), model.frequency,
+            problem.inside(point), model.still(found.values), model.searched,
         )  # fmt: skip
 
     def _extended(self, basis: Array, projected: Array, block: Array) -> tuple[Array, Array] | None:

@@ -41,7 +41,7 @@ class ModelAlongLine(OverNumber):
 
     def __init__(self, start: Numbered, end: ReducedModes) -> None:
         model = start.model
-        super().__init__(model.frequency, (0.0, 1.0), damped=bool(np.any(model.problem.powers == 1)))
+        super().__init__(model.searched, (0.0, 1.0), damped=bool(np.any(model.problem.powers == 1)))
         self.model, self._begin = model, start
         self.start, self.end = start.modes.point, end.point
         self._modes = {0.0: start.modes, 1.0: end}
@@ -100,7 +100,7 @@ def numbers_at(start: Numbered, end: ReducedModes) -> IntArray:
     mine, theirs = np.sort(np.abs(start.modes.values)), np.sort(np.abs(end.values))
     both = min(len(mine), len(theirs))
     rise = float(np.max(theirs[:both] / np.maximum(mine[:both], 1e-300), initial=1.0))
-    stays = np.abs(start.modes.values) * rise <= (1 - NEAR_TOP) * start.model.frequency
+    stays = np.abs(start.modes.values) * rise <= (1 - NEAR_TOP) * start.model.searched
     known = np.flatnonzero(stays & (start.numbers > 0))
     if not len(known):
         return found

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -23,8 +24,11 @@ from ...notebook import Shown, counted, html_table
 from ...tabular import MODE, Rows, Tabular, mode_cells
 from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
+from ..at_rest import more_slow, moving, rest_limit, told_growth
 from ..dense_problem import combined
-from ..tolerances import AT_REST, UNSTABLE_RELATIVE
+from ..quadratic.problem import Quadratic
+from ..quadratic.reach import searched_in
+from ..tolerances import UNSTABLE_RELATIVE
 from .dense import DenseModes, assembled, dense_modes
 from .problem import ParametricProblem
 from .states import States
@@ -36,8 +40,8 @@ REACH = 1.0 + 1e-9
 class ReducedModes(Tabular):
     """Modes at one point of the box: λ (k,) [1/s], residual (k,) of the full problem (scaled, both sides' larger one),
     error (k,) estimated of λ, relative; passed (k,): whether that is below the bound asked for. point: the values of
-    the parameters; inside: whether they lie in the box. right, left (r, k) are the vectors on the basis. top [1/s]: the
-    highest frequency promised, which says what is a motion as a whole."""
+    the parameters; inside: whether they lie in the box. right, left (r, k) are the vectors on the basis. still
+    [1/s]: up to which |λ| they may be motions as a whole; top [1/s]: up to where they were solved for."""
 
     point: Mapping[str, float]
     values: ComplexArray
@@ -47,6 +51,7 @@ class ReducedModes(Tabular):
     inside: bool
     right: ComplexArray
     left: ComplexArray
+    still: float = 0.0
     top: float = 0.0
 
     def of(self, chosen: BoolArray) -> ReducedModes:
@@ -92,7 +97,7 @@ class ReducedModes(Tabular):
     @property
     def unstable(self) -> BoolArray:
         """Which grow (k,), motions as a whole not among them: their λ is zero but for rounding."""
-        return growing(self.values, self.top)
+        return growing(self.values, self.still, self.top)
 
 
 @dataclass(frozen=True, repr=False)
@@ -135,6 +140,38 @@ class ReducedModel(Shown):
         """Whether it is the problem itself, on all of its freedoms."""
         return self.size == self.problem.size and bool(np.array_equal(self.vectors, np.eye(self.size)))
 
+    @cached_property
+    def searched(self) -> float:
+        """The frequency [1/s] up to which there may be modes: no higher than the one promised."""
+        return searched_in([self._small(point) for point in self.problem.sampled], self.frequency)
+
+    def still(self, values: ComplexArray) -> float:
+        """Up to which |λ| [1/s] modes λ (k,) of a point may be motions as a whole; 0 where none of them is slow."""
+        return 0.0 if np.all(moving(values, self.searched, lambda: self._rest_limit)) else self._rest_limit
+
+    def hidden(self, modes: ReducedModes) -> str:
+        """What is to be said of slow modes at a point that may be motions as a whole; empty for nothing."""
+        slow = modes.values[np.abs(modes.values) <= modes.still]
+        if not more_slow(self._small(modes.point), slow, self.searched):
+            return ""
+        return (
+            f"there are modes below {modes.still / (2 * np.pi):.3g} Hz, which cannot be told from motions as a whole: "
+            "whether they grow is not said"
+        )
+
+    def hidden_at(self, points: Sequence[Mapping[str, float]]) -> tuple[str, ...]:
+        """The same of several points, once."""
+        told = (self.hidden(self.modes(point, judged=False)) for point in points)
+        return tuple(dict.fromkeys(words for words in told if words))[:1]
+
+    @cached_property
+    def _rest_limit(self) -> float:
+        return rest_limit([self._small(point) for point in self.problem.sampled], self.searched)
+
+    def _small(self, point: Mapping[str, float]) -> Quadratic:
+        """The problem on the basis at a point."""
+        return Quadratic(*assembled(self.projected, self.problem.factors(point), self.problem.powers))
+
     @one_thread
     def modes(self, values: Mapping[str, float] | Sequence[float], *, judged: bool = True) -> ReducedModes:
         """All modes up to the promised frequency at a point of the box. Not judged, their residual and estimated error
@@ -144,13 +181,13 @@ class ReducedModel(Shown):
         matrices = assembled(self.projected, factors, powers)
         inside = self.problem.inside(point)
         # Outside the box nothing says that the states are those of its modes.
-        found = self.states.modes(matrices, self.frequency, REACH) if self.states is not None and inside else None
+        found = self.states.modes(matrices, self.searched, REACH) if self.states is not None and inside else None
         if found is None:
-            found = dense_modes(*matrices, self.frequency, REACH, whole=self.whole)
+            found = dense_modes(*matrices, self.searched, REACH, whole=self.whole)
         unknown = np.full(len(found.values), np.nan)
         made = ReducedModes(
             point, found.values, unknown, unknown, np.zeros(len(unknown), dtype=bool), inside, found.right, found.left,
-            self.frequency,
+            self.still(found.values), self.searched,
         )  # fmt: skip
         return self._judged(made, matrices, factors) if judged else made
 
@@ -177,10 +214,9 @@ class ReducedModel(Shown):
         return replace(modes, residual=np.maximum(right, left), error=error, passed=error <= self.bound)
 
 
-def growing(values: ComplexArray, top: float) -> BoolArray:
-    """Which λ (k,) of modes up to the highest frequency top [1/s] grow beyond rounding."""
-    size = np.abs(values)
-    return (values.real > UNSTABLE_RELATIVE * size) & (size > AT_REST * top)
+def growing(values: ComplexArray, still: float, top: float) -> BoolArray:
+    """Which λ (k,) of modes up to top [1/s] grow beyond rounding, those up to still [1/s] being motions as a whole."""
+    return (values.real > told_growth(values, UNSTABLE_RELATIVE, top)) & (np.abs(values) > still)
 
 
 def sketched(sketch: Array, factors: Array, powers: Array, lam: ComplexArray, z: ComplexArray) -> Array:

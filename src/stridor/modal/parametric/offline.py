@@ -7,6 +7,8 @@ first for the modes themselves, then at points of the box (`greedy`).
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
@@ -16,6 +18,7 @@ from ...errors import AnalysisError, CaseError
 from ...stages import passing, stage
 from ...threads import one_thread
 from ...typing import Array, IntArray, Sparse
+from ..quadratic.reach import reaches, searched_in
 from ..shift_inverted import undamped_pairs
 from .basis import Indefinite, ReducedBasis
 from .dense import assembled
@@ -51,7 +54,10 @@ def reduce(
         raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
     if not 1e-13 <= bound < 1:
         raise CaseError("bound", bound, "a relative error from 1e-13 to 1")
-    frequency = 2 * np.pi * max_frequency_hz
+    asked = 2 * np.pi * max_frequency_hz
+    frequency = asked if reaches(problem.at(problem.reference), asked) else searched_in(
+        [problem.at(point) for point in problem.sampled], asked
+    )
     work = ReductionCost()
     mass, stiffness = symmetric_parts(problem)
     stage(f"reduced model of {problem.size} freedoms: factors and modes at rest")
@@ -73,7 +79,7 @@ def reduce(
                 work.lap("first answers")
                 growing = Greedy(basis, operator, factor, frequency, bound, work)
                 growing.enrich(grid_points(problem, counts))
-                return growing.cut()
+                return replace(growing.cut(), frequency=asked)
             except Indefinite:
                 continue
     raise AnalysisError("the mass or the stiffness has no positive diagonal to measure by")

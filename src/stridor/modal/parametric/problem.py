@@ -17,6 +17,7 @@ from ..quadratic.problem import Quadratic
 from .factors import is_data
 
 Role = Literal["mass", "damping", "stiffness"]
+CORNERS = 3  # parameters up to which all corners of a box are looked at
 POWERS: Mapping[Role, int] = {"mass": 2, "damping": 1, "stiffness": 0}
 
 
@@ -135,6 +136,14 @@ class ParametricProblem:
     def powers(self) -> Array:
         """Exponents (t,) of λ: 2 for mass, 1 for damping, 0 for stiffness."""
         return np.array([POWERS[t.role] for t in self.terms])
+
+    @property
+    def sampled(self) -> list[dict[str, float]]:
+        """Points of the box that stand for all of it: its corners and what lies between them, of many parameters both
+        ends of all and the middle."""
+        if len(self.parameters) <= CORNERS:
+            return self.corners([3] * len(self.parameters))
+        return [{p.name: p.low + share * (p.high - p.low) for p in self.parameters} for share in (0.0, 0.5, 1.0)]
 
     def corners(self, counts: Sequence[int]) -> list[dict[str, float]]:
         """A grid over the box, ``counts`` points along each parameter, closer at the ends (Chebyshev–Lobatto)."""

@@ -7,6 +7,8 @@ left of their digits. Such a band is searched as far as there can be eigenvalues
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
@@ -14,6 +16,7 @@ import scipy.sparse as sp
 from ...typing import Sparse
 from .problem import Quadratic
 
+BETWEEN = 2.0  # times the bounds at points of a family
 BEYOND = 4.0  # times the bound: half of it, where searches end for modes that decay, is beyond it still
 UNSURE = 100.0  # the same where freedoms without mass carry forces: rigid contacts with friction make others faster
 CLEAR = 0.05  # share of the mass's diagonal that its other entries must leave to tell its smallest eigenvalue
@@ -26,6 +29,19 @@ def searched(problem: Quadratic, top: float) -> float:
     bound = fastest(problem)
     margin = BEYOND if np.all(problem.mass.diagonal() > 0.0) else UNSURE
     return min(top, margin * bound) if bound > 0.0 else top
+
+
+def searched_in(problems: Sequence[Quadratic], top: float) -> float:
+    """The same of all of a family that some of its problems stand for."""
+    if not problems or reaches(problems[0], top):
+        return top
+    return min(top, BETWEEN * max(searched(problem, np.inf) for problem in problems))
+
+
+def reaches(problem: Quadratic, top: float) -> bool:
+    """Whether something moves about as fast as ``top`` [1/s] or faster, as far as single freedoms show."""
+    mass, stiffness = problem.mass.diagonal(), problem.stiffness.diagonal()
+    return bool(np.any(np.abs(stiffness) >= (top / BEYOND) ** 2 * mass))
 
 
 def fastest(problem: Quadratic) -> float:
