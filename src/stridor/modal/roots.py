@@ -214,7 +214,7 @@ def _poles(stiffness: float, damping: float) -> list[complex]:
     inside = half * half - stiffness
     if inside <= 0:
         return [complex(-half, np.sqrt(-inside))]
-    fast = -half - np.sqrt(inside)
+    fast = -half - np.copysign(np.sqrt(inside), half)  # of the same sign: none is lost, nor zero
     return [complex(stiffness / fast), complex(fast)]
 
 
