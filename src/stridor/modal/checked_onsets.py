@@ -39,10 +39,11 @@ def checked_onsets(
     """The onsets with what grows at both ends of the range sought anew in the full problem.
 
     found: as `onsets` gives them; where a mode grows in the band at the high end that branches do not lead to, they are
-    solved again with branches from further above, from ``numbered_at`` on and with ``carried`` as in `onsets`. before:
-    what the full problem has at the low end with the nodes that touch below it; where the branches say the same of this
-    side, nothing is sought there again. Of small systems a few μ between are looked at as well. ``completeness`` says
-    what came of it, ``at_start`` and ``at_end`` are what the full problem has.
+    solved again with branches that start up to ``follow`` times the band, and of small systems with all, from
+    ``numbered_at`` on and with ``carried`` as in `onsets`. before: what the full problem has at the low end with the
+    nodes that touch below it; where the branches say the same of this side, nothing is sought there again. Of small
+    systems a few μ between are looked at as well. ``completeness`` says what came of it, ``at_start`` and ``at_end``
+    are what the full problem has.
     """
     options = options or Options()
     if not affordable(system):
@@ -58,7 +59,7 @@ def checked_onsets(
         said = f"{NOT_COMPLETE}: what grows at both ends was not found."
         return replace(found, completeness=f"{said} {UNCHECKED}: {error}.")
     between = between_ends(system, found, start, follow=FOLLOW, damped=damped, options=options)
-    for wider in (*follow, None):
+    for wider in (*follow, *([None] if follow else [])):
         amiss = len(_unled(found, start, end)[1]) or found.unexplained or found.unbalanced
         if not (amiss or between.lacking):
             break
