@@ -161,8 +161,8 @@ class _CycleSearch:
         looked = list(values)
         if self.method.name == "harmonic":
             self.notes.append(
-                "harmonic balance follows branches from the onsets: cycles that no such branch leads to are not looked "
-                "for"
+                "harmonic balance follows branches from the onsets, and at a single μ where none of them has a stable "
+                "cycle a run in time: cycles that neither leads to are not looked for"
             )
         if self.between is not None:
             self.onsets = self._onsets(self.between)
@@ -211,6 +211,8 @@ class _CycleSearch:
                 self._add(found, said)
 
         self.method.reached(mu, self.pushes, self._say, told)
+        if isinstance(self.method, Harmonic):
+            self.method.settled(self.work, mu, here, self._say, told)
 
     def _add(self, closed: Any, said: str) -> None:
         """A cycle, with its branch where a range is asked for that holds it."""
