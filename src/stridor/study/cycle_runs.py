@@ -1,4 +1,4 @@
-"""Cycles that a run in time settles in: marched from steady sliding where it is unstable, closed by harmonic balance."""
+"""Cycles that a run in time settles in: from steady sliding where that is unstable, closed by harmonic balance."""
 
 from __future__ import annotations
 
@@ -70,8 +70,8 @@ class Asked:
 
 
 class SettledRun:
-    """A run at a friction coefficient from steady sliding that is pushed by ``push`` [m/s], part by part, and the cycles
-    that it comes near to. seconds: of processor time, for its steps; ``say`` is told what is done."""
+    """A run at a friction coefficient from steady sliding that is pushed by ``push`` [m/s], part by part, and cycles that
+    it comes near to. seconds: of processor time, for its steps; ``say`` is told what is done."""
 
     def __init__(
         self, work: Workspace, family: series.HarmonicFamily, mu: float, push: float, seconds: float,
@@ -117,7 +117,8 @@ class SettledRun:
             if least.off < SURE:
                 break
         for closed in held:
-            stays = not self.late and any(one.off < NEAR and _rounds(one.period, closed) for one in found)
+            # Where several rounds come back much nearer than one, the run is not in the cycle of one round.
+            stays = not self.late and any(one.off < NEAR and _rounds(one.period, closed) == 1 for one in found[-1:])
             yield closed, stays
             if stays:
                 return
