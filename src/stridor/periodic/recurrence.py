@@ -115,4 +115,4 @@ def _refined(kinds: list[Array], rough: Array, lag: int, window: int) -> tuple[f
         later = (1.0 - share) * kind[whole : whole + window] + share * kind[whole + 1 : whole + window + 1]
         swing = float(np.mean(np.abs(kind[:window])))
         off = max(off, float(np.mean(np.abs(later - kind[:window]))) / max(swing, 1e-300))
-    return fine, off
+    return float(fine), off

@@ -33,7 +33,7 @@ from ..periodic import harmonic as series
 from ..temporal.steppers.exact.varied import VariedMotion
 from ..typing import Array
 from .cycle_runs import PUSHES as RUN_PUSHES
-from .cycle_runs import Asked, SettledRun, fastest
+from .cycle_runs import Asked, SettledRun, alike, fastest
 from .workspace import Workspace
 
 PUSHES = (1.0, 3.0)  # of the slip speed
@@ -185,7 +185,7 @@ class Harmonic:
         self, mu: float, push: Sequence[float] | None, say: Say,
         told: Callable[[str, series.Balanced | Unreached], None],
     ) -> None:  # fmt: skip
-        """Cycles at a μ on the branches that begin at the onsets: no motions are followed."""
+        """Cycles at a μ on the branches that begin at the onsets."""
         if not self.onsets:
             told("", Unreached(f"μ = {mu:.6g}: no onset of steady sliding from which a branch could lead there"))
         for onset in self.onsets:
@@ -224,6 +224,8 @@ class Harmonic:
             said = f"a run in time from a push of {push:.4g} m/s"
             try:
                 for closed, stays in run.cycles(mode, asked, self._stable):
+                    if any(alike(other, closed) for other in known):
+                        continue  # a branch has it
                     told(said if stays else f"{said}, which passes near to it", closed)
                 return
             except (AnalysisError, CaseError, np.linalg.LinAlgError) as error:

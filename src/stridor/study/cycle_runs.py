@@ -29,12 +29,12 @@ PARTS = 8  # of a run, at most
 MOST_STEPS = 4_000_000
 SAMPLES = 400  # records in a period of that mode
 STEPS = 3  # explicit ones between records, at least
-MOST_TURNS = 12  # of that mode in a period
+MOST_TURNS = 20  # of that mode in a period
 NEAR = 0.02  # of its mean swing: a motion that comes back so close is tried
 CLOSER = 0.3  # of what was tried last: what is tried next
 SURE = 5e-3  # a motion that comes back so close repeats itself
-PERIOD, AMPLITUDE = 0.01, 0.05  # further from the run than this it is another motion
-ALIKE = 0.2  # of these: as near to one another two of a run are the same
+PERIOD, AMPLITUDE = 3e-3, 0.03  # further from the run than this it is another motion
+ALIKE, AS_LARGE = 2e-3, 0.01  # of period and amplitude: as near to one another two of a run are the same
 
 
 class Unsettled(AnalysisError):
@@ -70,8 +70,8 @@ class Asked:
 
 
 class SettledRun:
-    """A run at a friction coefficient from steady sliding that is pushed by ``push`` [m/s], part by part, and cycles that
-    it comes near to. seconds: of processor time, for its steps; ``say`` is told what is done."""
+    """A run at a friction coefficient from steady sliding pushed by ``push`` [m/s], part by part, and cycles that it
+    comes near to. seconds: of processor time, for its steps; ``say`` is told what is done."""
 
     def __init__(
         self, work: Workspace, family: series.HarmonicFamily, mu: float, push: float, seconds: float,
@@ -104,7 +104,7 @@ class SettledRun:
                 if isinstance(closed, str):
                     why = f"; it was taken for a cycle of {one.period:.6g} s, but {closed}"
                     continue
-                closed = next((other for other in held if _alike(other, closed)), closed)
+                closed = next((other for other in held if alike(other, closed)), closed)
                 kept = stable(closed)
                 if kept or (kept is None and one.off < SURE):
                     yield closed, True
@@ -234,11 +234,11 @@ def _rounds(period: float, closed: series.Balanced) -> int:
     return rounds if abs(rounds * closed.period / period - 1.0) <= PERIOD else 0
 
 
-def _alike(one: series.Balanced, other: series.Balanced) -> bool:
+def alike(one: series.Balanced, other: series.Balanced) -> bool:
     """Whether two cycles are the same as far as the harmonics of both tell, the other once or several times round."""
     first, second = series.slip_amplitudes(one), series.slip_amplitudes(other)
     rounds = max(1, round(other.period / one.period))
     return (
-        abs(rounds * one.period / other.period - 1.0) <= ALIKE * PERIOD
-        and float(np.abs(first - second).max()) <= ALIKE * AMPLITUDE * float(first.max())
+        abs(rounds * one.period / other.period - 1.0) <= ALIKE
+        and float(np.abs(first - second).max()) <= AS_LARGE * float(first.max())
     )
