@@ -8,6 +8,7 @@ import numpy as np
 
 from ..typing import Array
 
+ROUNDING = 1e-9  # of the largest: swings that are none
 ROUGH = 0.3  # of the root mean square of its swing: returns so far off are looked at closely
 AS_GOOD = 3.0  # times the least: a shorter time that comes back nearly as close is the period
 NONE = 5e-3  # of the swing: what records make where force and slip have corners, which fall between them
@@ -38,11 +39,14 @@ class ContactPart:
         """Each kind (t, channels) about its mean, over what the kind swings by: one scale for all its nodes, so that
         those that hardly move count little."""
         found: list[Array] = []
-        for values in (self.normal, self.tangential, self.gap, self.slip):
+        force, speed = float(np.abs(self.normal).max()), float(np.abs(self.slip).max())
+        way = max(float(np.abs(self.gap).max()), speed * self.spacing)  # gaps of contacts kept closed are rounding
+        given = ((self.normal, force), (self.tangential, force), (self.gap, way), (self.slip, speed))
+        for values, whole in given:
             flat = values.reshape(len(values), -1)
             swing = flat - flat.mean(axis=0)
             size = float(np.sqrt(np.mean(swing**2, axis=0).sum()))
-            if size > 1e-9 * max(float(np.abs(flat).max()), 1e-300):
+            if size > ROUNDING * whole:
                 found.append(swing / size)
         return found
 

@@ -230,6 +230,8 @@ class Harmonic:
                 return
             except (AnalysisError, CaseError, np.linalg.LinAlgError) as error:
                 told(said, Unreached(f"μ = {mu:.6g}, from {said}: {error}"))
+            if run.late:
+                return
 
     def _stable(self, cycle: series.Balanced) -> bool | None:
         return series.sampled_series(cycle, "").stable

@@ -34,7 +34,8 @@ NEAR = 0.02  # of its mean swing: a motion that comes back so close is tried
 CLOSER = 0.3  # of what was tried last: what is tried next
 SURE = 5e-3  # a motion that comes back so close repeats itself
 PERIOD, AMPLITUDE = 3e-3, 0.03  # further from the run than this it is another motion
-ALIKE, AS_LARGE = 2e-3, 0.01  # of period and amplitude: as near to one another two of a run are the same
+ALIKE = 2e-3, 0.01  # of period and amplitude: as near to one another two are the same, and with few harmonics
+BY_HARMONICS = 0.03, 0.3  # over their number, as series follow a friction that jumps no better
 
 
 class Unsettled(AnalysisError):
@@ -167,7 +168,7 @@ class SettledRun:
             if planned > MOST_STEPS:
                 raise Unsettled(f"it takes more than {MOST_STEPS} steps of {settings.step:.3g} s to settle")
             self.say(f"run in time at μ = {self.mu:.6g}, part {k + 1} of at most {len(phases)}")
-            self.since = math.inf
+            self.since, begun = math.inf, clock.process_time()
             before = () if run is None else run.phases
             run = simulate(
                 system, phases[: k + 1], settings, mu=self.mu, progress=self._progress, restart=run, join=False
@@ -175,7 +176,9 @@ class SettledRun:
             run = replace(run, phases=(*before, *run.phases))  # what the next part goes on from
             if run.interrupted and not self.late:
                 raise KeyboardInterrupt
-            if self.late:
+            self.spent += min(clock.process_time() - begun, run.wall_seconds)  # without what was compiled
+            if self.late or self.spent > self.seconds:
+                self.late = True
                 return
             self.lasted += phases[k].duration
             yield self._part(run)
@@ -199,10 +202,9 @@ class SettledRun:
 
     def _progress(self, done: int, planned: int) -> None:
         del done, planned
-        now = clock.process_time()
         # Before the first call the loop may have been compiled, which takes longer than a run.
-        self.spent, self.since = self.spent + max(now - self.since, 0.0), now
-        if self.spent > self.seconds:
+        self.since = min(self.since, clock.process_time())
+        if self.spent + clock.process_time() - self.since > self.seconds:
             self.late = True
             raise KeyboardInterrupt
 
@@ -238,7 +240,9 @@ def alike(one: series.Balanced, other: series.Balanced) -> bool:
     """Whether two cycles are the same as far as the harmonics of both tell, the other once or several times round."""
     first, second = series.slip_amplitudes(one), series.slip_amplitudes(other)
     rounds = max(1, round(other.period / one.period))
+    finer = min(one.harmonics, other.harmonics / rounds)
+    near, large = (max(least, share / finer) for least, share in zip(ALIKE, BY_HARMONICS, strict=True))
     return (
-        abs(rounds * one.period / other.period - 1.0) <= ALIKE
-        and float(np.abs(first - second).max()) <= AS_LARGE * float(first.max())
+        abs(rounds * one.period / other.period - 1.0) <= near
+        and float(np.abs(first - second).max()) <= large * float(first.max())
     )

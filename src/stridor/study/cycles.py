@@ -57,8 +57,8 @@ def cycles(
     upper end, and at ``mu``. push [m/s]: by how much the slip velocities are pushed off steady sliding (default: one
     and three times the slip speed). points: most cycles of a branch, each way; seconds: of processor time, by
     shooting for a motion that comes back to nowhere (default: 60), by harmonic balance for following a branch (default:
-    no limit) and for a run in time (60). progress: called with the number of cycles so far and what is done; keep: with what was found so far,
-    behind each cycle. Ctrl-C ends the search and gives what was found.
+    no limit) and a run (60). progress: called with the number of cycles so far and what is done; keep: with what was
+    found so far, behind each cycle. Ctrl-C ends the search and gives what was found.
 
     Cycles to which no motion and no branch leads are not found. Raises CaseError for what the method does not take and
     where nothing slides, AnalysisError where steady sliding does not exist.
