@@ -186,9 +186,11 @@ def test_most_small_benches_have_the_motion_of_their_run():
         if not again or again[-1].off > 0.005:
             continue
         counted += 1
+        hits: list[bool] = []
         for cycle in st.cycles(work, mu, seconds=8.0).cycles:
             ratio = max(again[-1].period / cycle.period, cycle.period / again[-1].period)
-            own = part.amplitudes[0]
-            met += abs(ratio / round(ratio) - 1.0) < 2e-3 and abs(cycle.slip_amplitudes[0] / own - 1.0) < 0.02
+            alike = abs(cycle.slip_amplitudes[0] / part.amplitudes[0] - 1.0) < 0.02
+            hits.append(alike and abs(ratio / round(ratio) - 1.0) < 2e-3)
+        met += any(hits)
     assert counted >= 15
     assert met >= 0.6 * counted
