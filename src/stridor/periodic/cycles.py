@@ -72,7 +72,8 @@ class Cycles(Tabular):
     def sentence(self) -> str:
         """What was found, in one sentence."""
         if not self.cycles:
-            return "no limit cycle was found"
+            rest = "; what was looked for and not reached is named below" if self.missing else ""
+            return f"no limit cycle was found{rest}"
         mus = [c.mu for c in self.cycles]
         over = f"μ = {mus[0]:.6g}" if min(mus) == max(mus) else f"μ = {min(mus):.6g} to {max(mus):.6g}"
         count = [sum(c.stable is s for c in self.cycles) for s in (True, False, None)]

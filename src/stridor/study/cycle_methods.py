@@ -10,7 +10,7 @@ from typing import Any, Literal, Protocol, TypeVar
 
 import numpy as np
 
-from ..errors import AnalysisError
+from ..errors import AnalysisError, CaseError
 from ..periodic import (
     ClosedShot,
     Cycle,
@@ -32,6 +32,9 @@ from ..periodic import (
 from ..periodic import harmonic as series
 from ..temporal.steppers.exact.varied import VariedMotion
 from ..typing import Array
+from .cycle_runs import PUSHES as RUN_PUSHES
+from .cycle_runs import Asked, SettledRun, alike, fastest
+from .workspace import Workspace
 
 PUSHES = (1.0, 3.0)  # of the slip speed
 HARMONICS = 7  # to begin with, where the defect is to decide
@@ -182,7 +185,7 @@ class Harmonic:
         self, mu: float, push: Sequence[float] | None, say: Say,
         told: Callable[[str, series.Balanced | Unreached], None],
     ) -> None:  # fmt: skip
-        """Cycles at a μ on the branches that begin at the onsets: no motions are followed."""
+        """Cycles at a μ on the branches that begin at the onsets."""
         if not self.onsets:
             told("", Unreached(f"μ = {mu:.6g}: no onset of steady sliding from which a branch could lead there"))
         for onset in self.onsets:
@@ -197,6 +200,41 @@ class Harmonic:
                 told(said, Unreached(f"μ = {mu:.6g}, {said}: it does not pass there; {end}"))
             elif not end.startswith("it comes to steady sliding"):
                 told(said, Unreached(f"μ = {mu:.6g}, {said}: {end}", expected=not unfinished(end)))
+
+    def settled(
+        self, work: Workspace, mu: float, known: Sequence[series.Balanced], say: Say,
+        told: Callable[[str, series.Balanced | Unreached], None],
+    ) -> None:  # fmt: skip
+        """What a run in time settles in, where steady sliding is unstable and none of the cycles known is stable."""
+        if any(self._stable(one) for one in known):
+            return
+        try:
+            mode = fastest(work, mu)
+        except AnalysisError as error:
+            told("", Unreached(f"μ = {mu:.6g}, from a run in time: {error}"))
+            return
+        if mode is None:
+            return
+        asked = Asked(HARMONICS, MOST_HARMONICS, DEFECT)
+        if self.harmonics is not None:
+            asked = Asked(self.harmonics, self.harmonics, math.inf)
+        for share in RUN_PUSHES:
+            push = share * float(self.family.speed.max(initial=0.0))
+            run = SettledRun(work, self.family, mu, push, min(self.branch_seconds, SECONDS), say)
+            said = f"a run in time from a push of {push:.4g} m/s"
+            try:
+                for closed, stays in run.cycles(mode, asked, self._stable):
+                    if any(alike(other, closed) for other in known):
+                        continue  # a branch has it
+                    told(said if stays else f"{said}, which passes near to it", closed)
+                return
+            except (AnalysisError, CaseError, np.linalg.LinAlgError) as error:
+                told(said, Unreached(f"μ = {mu:.6g}, from {said}: {error}"))
+            if run.late:
+                return
+
+    def _stable(self, cycle: series.Balanced) -> bool | None:
+        return series.sampled_series(cycle, "").stable
 
     def _through(self, onset: CycleOnset, mu: float, met: Callable[[series.Balanced], None]) -> tuple[int, str]:
         """Hand on the cycles at a μ of the branch of an onset: how many there are, and how the branch ends."""

@@ -50,14 +50,15 @@ def cycles(
     as many as its defect asks for).
 
     mu: at each of these, by shooting the cycles that motions run into which begin in every growing mode and in steady
-    sliding that is pushed; by harmonic balance those of the branches that begin at the onsets in modal.friction_range.
+    sliding that is pushed; by harmonic balance those of the branches that begin at the onsets in modal.friction_range,
+    and where none of these is stable and steady sliding is unstable, that in which a run in time settles.
     between (low, high) (default, without mu: modal.friction_range): the branches that begin at the onsets of steady
     sliding, through folds, and by shooting those of cycles that motions run into just below the lowest onset, at the
     upper end, and at ``mu``. push [m/s]: by how much the slip velocities are pushed off steady sliding (default: one
     and three times the slip speed). points: most cycles of a branch, each way; seconds: of processor time, by
     shooting for a motion that comes back to nowhere (default: 60), by harmonic balance for following a branch (default:
-    no limit). progress: called with the number of cycles so far and what is done; keep: with what was found so far,
-    behind each cycle. Ctrl-C ends the search and gives what was found.
+    no limit) and a run (60). progress: called with the number of cycles so far and what is done; keep: with what was
+    found so far, behind each cycle. Ctrl-C ends the search and gives what was found.
 
     Cycles to which no motion and no branch leads are not found. Raises CaseError for what the method does not take and
     where nothing slides, AnalysisError where steady sliding does not exist.
@@ -82,7 +83,7 @@ def cycles(
     if harmonics is not None and chosen != "harmonic":
         raise CaseError("harmonics", harmonics, 'harmonics of method "harmonic"; shooting has none')
     if pushes is not None and chosen == "harmonic":
-        raise CaseError("push", push, 'pushes of method "shooting"; harmonic balance follows no motions')
+        raise CaseError("push", push, 'pushes of method "shooting"; harmonic balance follows no motions from them')
     if between is None and not values:
         between = work.modal.friction_range
     if between is not None:
@@ -161,8 +162,8 @@ class _CycleSearch:
         looked = list(values)
         if self.method.name == "harmonic":
             self.notes.append(
-                "harmonic balance follows branches from the onsets: cycles that no such branch leads to are not looked "
-                "for"
+                "harmonic balance follows branches from the onsets, and at a single μ where none of them has a stable "
+                "cycle a run in time: cycles that neither leads to are not looked for"
             )
         if self.between is not None:
             self.onsets = self._onsets(self.between)
@@ -211,6 +212,8 @@ class _CycleSearch:
                 self._add(found, said)
 
         self.method.reached(mu, self.pushes, self._say, told)
+        if isinstance(self.method, Harmonic):
+            self.method.settled(self.work, mu, here, self._say, told)
 
     def _add(self, closed: Any, said: str) -> None:
         """A cycle, with its branch where a range is asked for that holds it."""

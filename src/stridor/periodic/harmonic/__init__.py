@@ -1,8 +1,9 @@
 """Limit cycles by harmonic balance, condensed to the contact nodes: many of them, in the plane and in space."""
 
-from .balanced import Balanced, Kept, balanced, defect, guessed, kept
+from .balanced import Balanced, Kept, balanced, defect, guessed, kept, slip_amplitudes
 from .birth import born
 from .branch import HarmonicBranch
+from .from_run import from_run
 from .hill import Hill, hill
 from .problem import HarmonicFamily, why_not_harmonic
 from .sampling import sampled_series
@@ -16,9 +17,11 @@ __all__ = [
     "balanced",
     "born",
     "defect",
+    "from_run",
     "guessed",
     "hill",
     "kept",
     "sampled_series",
+    "slip_amplitudes",
     "why_not_harmonic",
 ]

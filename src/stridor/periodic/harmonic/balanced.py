@@ -197,3 +197,10 @@ def guessed(
     omega = 2 * np.pi / period
     scale = scale or scales(family, omega, mu, harmonics)
     return Balanced(evaluated(family, base.real_of(amplitudes), omega, mu, scale))
+
+
+def slip_amplitudes(cycle: Balanced) -> Array:
+    """Half the range (m,) of the slip velocity [m/s], of the tangent along which it is largest."""
+    at = cycle.at
+    _, speed, _ = cycle.family.split(at.omega * at.motion @ at.base.turn.T @ at.base.series.T)
+    return 0.5 * np.ptp(speed, axis=2).max(axis=1)
