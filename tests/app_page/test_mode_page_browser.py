@@ -77,8 +77,11 @@ def html(dimension: int = 3) -> str:
 
 
 @cache
-def around() -> str:
-    """A page that has one in a frame, as that of `stridor app` does: it is dark, and told of a model when it is ready."""
+def around(script: str) -> str:
+    """A page that has one in a frame, as that of `stridor app` does: it is dark, and told of a model when it is ready.
+    script: runs in the frame before its own, which a browser that is busy does not promise of those of a context."""
+    shell = animation_shell().replace("<head>", f"<head><script>{script}</script>", 1)
+    assert script in shell
     data = json.dumps(page_data(rings(), scale=None))
     return f"""<!doctype html><body style="margin: 0"><script>const heard = [];
       window.addEventListener("message", (event) => {{
@@ -87,7 +90,7 @@ def around() -> str:
         if (event.data === "stridor-mode-ready") for (const told of [{{ dark: true }}, {{ geometry: {data}, title: "Rings", growth: "unstable", unstable: true }}]) tell(told);
         if (event.data === "stridor-viewer-wanted") tell({{ viewer: {json.dumps(viewer_script())} }});
       }});</script>
-      <iframe sandbox="allow-scripts" srcdoc="{escape(animation_shell())}" style="width: 100%; height: 98vh; border: 0"></iframe>"""
+      <iframe sandbox="allow-scripts" srcdoc="{escape(shell)}" style="width: 100%; height: 98vh; border: 0"></iframe>"""
 
 
 @contextmanager
@@ -184,7 +187,7 @@ def test_it_moves_by_phase_alone_and_everything_is_sent_once(browser: Any, tmp_p
 
 def test_the_canvas_goes_on_where_the_graphics_card_is_taken_away(browser: Any, tmp_path: Path):
     """In a frame that asks the page around it for what it needs; before it is there, and after it was lost, too."""
-    with opened(browser, around(), tmp_path, NO_WEBGL) as page:
+    with opened(browser, around(NO_WEBGL), tmp_path, "") as page:
         frame = page.frames[1]
         frame.wait_for_function("cardless")
         frame.evaluate(STILL)
@@ -192,7 +195,7 @@ def test_the_canvas_goes_on_where_the_graphics_card_is_taken_away(browser: Any, 
         wanted = picture(frame)
         assert wanted[0, 0].tolist() == [27, 29, 34]  # dark
         assert unlike(wanted, np.broadcast_to(wanted[0, 0], wanted.shape)) > 0.08
-    with opened(browser, around(), tmp_path, SMOOTH) as page:
+    with opened(browser, around(SMOOTH), tmp_path, "") as page:
         frame = page.frames[1]
         frame.wait_for_function("card !== null")
         frame.evaluate(STILL)

@@ -105,7 +105,7 @@ def check_is_run(cycle: Cycle, part: ContactPart) -> None:
     assert cycle.period == pytest.approx(mean_period(part, cycle.period), rel=1e-3)
 
 
-@pytest.mark.parametrize("seed", [35, 36, 38])
+@pytest.mark.parametrize("seed", [pytest.param(35, marks=pytest.mark.slow), 36, 38])
 def test_what_a_run_settles_in_is_found(seed: int):
     """Branches turn back or end before this friction coefficient."""
     work, mu = work_of(seed)
@@ -132,7 +132,7 @@ def test_a_motion_that_does_not_repeat_itself_is_no_cycle():
     assert not [one for one in recurrences(long_run(seed), 0.005) if one.off < 0.005]
 
 
-@pytest.mark.parametrize("told", [True, False])
+@pytest.mark.parametrize("told", [pytest.param(True, marks=pytest.mark.slow), False])
 def test_a_cycle_that_a_branch_has_is_there_once(monkeypatch: pytest.MonkeyPatch, told: bool):
     """Of a block on a belt: a run is made only where the stability of the branch's cycle is not told."""
     system = block_on_belt(law=Hyperbolic(0.0, 1.0, 3.0), damping=0.1, speed=1.0)

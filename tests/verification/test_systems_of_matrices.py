@@ -217,7 +217,7 @@ def test_the_pencil_takes_the_friction_of_the_contacts_where_they_have_one():
     contact = {"normal": [0, 1], "tangent": [1, 0], "stiffness": 10.0, "friction": LAW}
     other = contact | {"friction": {"law": "coulomb", "coefficient": 0.9 * LAW["coefficient"]}}
     two = System.from_matrices(np.eye(2), None, HOFFMANN, contacts={"A": contact, "B": other | {"normal": [1, 0], "tangent": [0, 1]}})
-    with pytest.raises(st.CaseError, match=r"^mu: missing – give the friction coefficient"):
+    with pytest.raises(st.CaseError, match=r"^mu: one friction coefficient for all contacts, since the case gives them different ones: name it"):
         st.pencil(two)
 
 
