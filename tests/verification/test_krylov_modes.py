@@ -331,6 +331,23 @@ def test_a_basis_that_takes_rounding_in_is_given_up(monkeypatch):
     assert len(seen) < 12
 
 
+STRICT = 1e-15  # a backward error that no basis reaches
+
+
+@pytest.mark.parametrize("left", [False, True])
+def test_pairs_that_were_exact_are_looked_at_again_in_the_end(left):
+    """Whatever was said of them on a smaller basis: here that all of them were."""
+    problem = problem_of(scattered(3, 0.05, 0.02, size=120), None, Options(), frictions=np.array([0.0, 0.6]))
+    reduced = refine.projected(problem, refine.Band(6, None), 0.6)
+    found = reduced.untracked(0.6)
+    asked = refine.unbalanced(reduced, 0.6, STRICT, left=left)
+    again = refine.unbalanced(reduced, 0.6, STRICT, left=left, exact=found.values)
+    assert asked.error > STRICT
+    assert again.error == asked.error
+    assert again.forces.shape == asked.forces.shape
+    assert np.array_equal(np.sort_complex(again.exact), np.sort_complex(asked.exact))
+
+
 @pytest.mark.slow
 def test_left_vectors_beside_stiff_contact():
     """A coarse mesh of the shipped pad: a basis that opens gaps against 2e12 N/m³ takes rounding in."""
