@@ -15,6 +15,7 @@ import stridor as st
 from program import stridor
 from stridor.case import loads, template_text
 from stridor.errors import AnalysisError, CaseError, StridorError
+from stridor.sliding.equilibrium import unsettled
 from stridor.system import build_system
 
 pytestmark = pytest.mark.bad_input
@@ -900,8 +901,8 @@ def test_a_body_that_nothing_holds() -> None:
 def test_loads_that_pull_the_bodies_apart() -> None:
     message = no_answer(changed(PLANE, "pressure = 1e6", "pressure = -1e6"))
     # Which of the two depends on how the direct solver meets a singular matrix.
-    free = "steady sliding has no equilibrium: body slider can move freely"
-    assert message.startswith((free, "steady sliding: the set of touching nodes does not settle"))
+    free = f"steady sliding has no equilibrium: body slider can move freely under the loads; {LOOSE}"
+    assert message in (free, f"steady sliding: {unsettled(5, 60)}")
 
 
 def test_friction_that_jams() -> None:

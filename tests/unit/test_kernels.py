@@ -502,3 +502,20 @@ def test_what_compiled_code_calls_has_no_entry_for_python_and_python_still_calls
     assert not [name for name in names if name.startswith(form.fndesc.llvm_cpython_wrapper_name)]
     assert twice(1.5) == 3.0
     assert len(twice.overloads) == 1
+
+
+def test_what_runs_on_other_threads_is_private_too():
+    """Its code is met again by name otherwise: where it is compiled, that is another form than where it is loaded."""
+
+    @njit(parallel=True)
+    def squares(values):
+        for i in numba.prange(len(values)):
+            values[i] *= values[i]
+
+    values = np.arange(4.0)
+    squares(values)
+    assert values.tolist() == [0.0, 1.0, 4.0, 9.0]
+    (form,) = squares.overloads.values()
+    defined = [f for f in form.library._final_module.functions if not f.is_declaration]
+    assert [f.name for f in defined if "gufunc" in f.name]
+    assert {f.linkage.name for f in defined} == {"external", "internal"}

@@ -17,6 +17,7 @@ from numba.core.compiler import Compiler
 
 from ..interrupts import in_one_piece
 
+SHARED = ("linkonce_odr", "weak_odr")  # copies of functions; of what runs on other threads
 _Library: Any = JITCodeLibrary
 _Compiler: Any = Compiler
 
@@ -34,7 +35,7 @@ class ClosedLibrary(_Library):
         if own._shared_module is own._final_module:
             own._shared_module = own._final_module.clone()
         for function in own._final_module.functions:
-            if not function.is_declaration and function.linkage.name == "linkonce_odr":
+            if not function.is_declaration and function.linkage.name in SHARED:
                 function.linkage = "internal"
         # The code comes in a callback of its generator: interrupted there it would be lost, and found missing later.
         with in_one_piece():

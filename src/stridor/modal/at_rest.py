@@ -55,9 +55,15 @@ def more_slow(problem: Quadratic, slow: ComplexArray, top: float) -> bool:
     small that these are counted."""
     if not len(slow) or problem.size > DENSE:
         return False
-    real = int(np.count_nonzero(slow.imag == 0.0))
-    # Rounding makes ±ε or ±jε of a double zero, and of the latter one is left unsaid.
-    return len(slow) - real + (real + 1) // 2 > _unresisted(problem, top, None).shape[1]
+    return double_zeros(slow) > _unresisted(problem, top, None).shape[1]
+
+
+def double_zeros(values: ComplexArray) -> int:
+    """Of how many motions as a whole eigenvalues (k,) near zero are: rounding makes ±ε or ±jε of a double zero, and of
+    the latter one may be left unsaid, the one below the real axis; what is there alone is real but for rounding."""
+    above, below = int(np.count_nonzero(values.imag > 0.0)), int(np.count_nonzero(values.imag < 0.0))
+    real = len(values) - above - min(above, below)
+    return above + (real + 1) // 2
 
 
 def told_growth(values: ComplexArray, relative: float, top: float) -> Array:

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from ...direct import SingularMatrix
 from ...errors import AnalysisError
 from ...typing import Array, BoolArray, ComplexArray, Sparse
-from ..at_rest import moving
+from ..at_rest import double_zeros, moving
 from ..dense_problem import DenseProblem, Eigenpairs, OverNumber, combined
 from ..krylov.follow import FOLLOWED
 from ..options import Options
@@ -278,13 +278,6 @@ class Whole(Along):
                 return False
             last = found.lam
         return last.real < 0
-
-
-def double_zeros(values: ComplexArray) -> int:
-    """Of how many motions as a whole eigenvalues near zero are: rounding makes ±ε or ±jε of a double zero, and of the
-    latter one is left unsaid."""
-    real = int(np.count_nonzero(values.imag == 0))
-    return len(values) - real + (real + 1) // 2
 
 
 def along(family: Family, frequency: float) -> Along:

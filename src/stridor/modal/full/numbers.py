@@ -13,10 +13,10 @@ import numpy as np
 from ...errors import AnalysisError
 from ...threads import one_thread
 from ...typing import Array, ComplexArray, IntArray
-from ..at_rest import moving
+from ..at_rest import double_zeros, moving
 from ..krylov.follow import State
 from ..quadratic.polish import pairs
-from .basis import DECAY, Along, along, double_zeros
+from .basis import DECAY, Along, along
 from .family import Family, SystemFamily
 from .follow import BEYOND, surely
 

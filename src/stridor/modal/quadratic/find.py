@@ -362,7 +362,8 @@ class _RegionSearch:
 
     def _converged(self, found: DiscModes, problem: Quadratic, which: str) -> DiscModes:
         """With those that miss the tolerance improved one by one."""
-        bad = np.flatnonzero(~(found.error <= self.tolerance))
+        # Of zero but for rounding a sharper one is another rounding, the same for several perhaps.
+        bad = np.flatnonzero(~(found.error <= self.tolerance) & ~(np.abs(found.values) <= self.still))
         values, shapes, error = found.values.copy(), found.shapes.copy(), found.error.copy()
         for index in bad[:POLISHED]:
             better = polished(problem, complex(values[index]), shapes[:, index], solver=self.solver)
