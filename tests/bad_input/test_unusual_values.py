@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import types
@@ -391,3 +392,14 @@ def test_verbs_warn_of_friction_that_is_asked_for(tmp_path: Any, capsys: pytest.
     (tmp_path / "case.toml").write_text(SHORT.text)
     _, _, err = program(["modes", str(tmp_path / "case.toml"), "--mu", "30"], capsys)
     assert "warning: --mu: 30 is unusual for a friction coefficient, usually at most 10; if 30 % is meant" in " ".join(err.split())
+
+
+def test_lengths_that_no_number_reaches() -> None:
+    """Such a beam has no place for anything, and one as long has more poles that rounding joins than freedoms."""
+    with pytest.raises(CaseError, match=r"supports\.guide\.at: 'beam1\.top' – not told where on a beam of 4\.94065646e-324 m"):
+        loads(template_text("two-beams"), ["bodies.beam1.length=5e-324"])
+    for far in (1e19, 1e30):
+        case = loads(template_text("two-beams"), [f"bodies.beam2.length={far}"])
+        with contextlib.suppress(AnalysisError, CaseError), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            st.describe(case)

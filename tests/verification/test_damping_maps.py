@@ -195,6 +195,11 @@ def test_only_dampings_are_mapped_on_a_reduced_model(block, monkeypatch):
     )
 
 
+def test_a_number_against_itself_is_refused(block):
+    with pytest.raises(st.CaseError, match=r"^y: '.*' – the same number as x; give another one$"):
+        solve(block, Y, Y, grid=(2, 2), **RANGES)
+
+
 def test_small_systems_are_searched_in_full(block, monkeypatch):
     monkeypatch.setattr(damping_full, "lowest_onset", lambda *_, **__: None)
     seen = []

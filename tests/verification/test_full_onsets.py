@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -255,6 +256,34 @@ def test_freedoms_without_mass_multipliers_and_free_bodies(tmp_path: Path, dampi
         assert onset.frequency_hz == pytest.approx(expected.frequency_hz, rel=1e-11)
         assert onset.branches[0] == first
         assert found.completeness.startswith("Complete")
+
+
+def test_an_eigenvalue_that_passes_through_infinity(tmp_path: Path):
+    """A freedom without mass whose stiffness 120 − 100 μ passes zero at 1.2: from there on the other has the negative
+    stiffness 40 − 54 (54 − 50 μ)/(120 − 100 μ), without bounds at first and until 13 μ = 18.84. Of a low band nothing
+    is left before."""
+    mass, stiffness = np.diag([0.0, 1.0]), np.array([[120.0, 54.0], [54.0, 40.0]])
+    friction = np.array([[-100.0, -50.0], [0.0, 0.0]])
+    terms = [(mass, "mass", ""), (stiffness, "stiffness", ""), (friction, "stiffness", "mu")]
+    for top in (10.0, 100.0):
+        found = st.onsets(matrix_case(tmp_path, terms, top), (0.0, 1.5))
+        (onset,) = found.onsets
+        assert onset.stabilising
+        assert onset.mu == pytest.approx(18.84 / 13, rel=1e-11)
+        assert found.completeness.startswith("Not complete")
+
+
+def test_libraries_have_nothing_to_warn_of(tmp_path: Path):
+    """Real eigenvalues alone, of which some are sharpened one by one in complex arithmetic."""
+    stiffness = np.zeros((3, 3))
+    stiffness[0, 1] = -2e4
+    terms = [(np.diag([2.0, 3.0, 2.0]), "mass", ""), (0.1 * np.eye(3), "damping", ""), (stiffness, "stiffness", "mu")]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = st.modes(matrix_case(tmp_path, terms, 100.0), 0.3)
+        assert not st.onsets(matrix_case(tmp_path, terms, 100.0)).onsets
+    rates = np.sort(found.eigenvalues[0].real)
+    assert rates[:3] == pytest.approx([-0.05, -0.05, -0.1 / 3], rel=1e-9)
 
 
 # -- meshed models on a way round ----------------------------------------------------------------------------------------

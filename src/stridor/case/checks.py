@@ -166,6 +166,9 @@ def _beam_support_problems(
 ) -> Iterator[Problem]:
     where = f"supports.{name}"
     position = point.distance * body.elements / body.length_m
+    if not math.isfinite(position):
+        yield Problem(f"{where}.at", support.at, f"not told where on a beam of {body.length_m:.9g} m; give it a length")
+        return
     if abs(position - round(position)) > NODE_TOLERANCE:
         step = body.length_m / body.elements
         nearest = math.floor(position) * step, math.ceil(position) * step

@@ -61,7 +61,7 @@ def damping_map(
     for again in the full problem. It takes dampings only. "auto": the reduced model for large systems where it can be
     made. progress: called with points done and planned.
 
-    Raises CaseError for paths that lead to no number and for "reduced" where there is no reduced model.
+    Raises CaseError for paths that lead to no number or to the same, and for "reduced" where there is no reduced model.
     """
     started = time.perf_counter()
     work = Workspace.of(problem)
@@ -73,6 +73,8 @@ def damping_map(
     xs, ys = _values(x_range, grid[0], "x_range"), _values(y_range, grid[1], "y_range")
     if len(xs) * len(ys) > MOST_POINTS:
         raise CaseError("grid", f"{len(xs)} × {len(ys)}", f"at most {MOST_POINTS} points in all")
+    if x == y:
+        raise CaseError("y", y, "the same number as x; give another one")
     for path in (x, y):
         number_at(case, path)
     full = FullSearch(case, (x, y), (low, high), top)

@@ -254,7 +254,7 @@ def _apart(q: ComplexArray, pole: complex, damping: Array) -> tuple[ComplexArray
 
     The eigenvalue solver gives any k of that plane; the sum over modes holds of those that this form keeps apart.
     """
-    if not np.all(np.isfinite(q)):
+    if not np.all(np.isfinite(q)) or q.shape[1] > len(q):  # more than there are freedoms: rounding joins them
         return q, pole
     shapes = np.linalg.svd(q, full_matrices=False)[0]
     form = shapes.T @ (2 * pole * shapes + damping @ shapes)

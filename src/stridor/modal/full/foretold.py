@@ -24,8 +24,8 @@ def changes_within(family: Family, found: Eigenpairs, step: float, top: float) -
     square, change = half * half, 2 * half * turn
     # How near to zero the square comes within the step.
     with np.errstate(all="ignore"):
-        part = -np.real(square * change.conj()) / np.abs(change) ** 2
-    nearest = square + np.clip(np.nan_to_num(part / step), 0.0, 1.0) * step * change
+        part = -np.real(square * change.conj()) / np.abs(change) ** 2 / step
+    nearest = square + np.clip(np.nan_to_num(part), 0.0, 1.0) * step * change
     together = np.abs(nearest) <= TOGETHER * np.abs(square)
     return bool(np.any(together & (_roots(family, one, other, step, top) != _roots(family, one, other, 0.0, top))))
 

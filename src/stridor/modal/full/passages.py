@@ -105,6 +105,8 @@ def _by_square(source: Along, passage: Passage) -> Iterator[Guess]:
 
     def sampled(t: float) -> tuple[float, int]:
         found = source.eigenpairs(t)
+        if not len(found.coordinate):
+            return float("nan"), 0
         if passage.kind == "divergence":
             index = int(np.argmin(np.abs(found.coordinate)))
             return float(found.coordinate[index].real), index
@@ -113,6 +115,8 @@ def _by_square(source: Along, passage: Passage) -> Iterator[Guess]:
         return float(pair_near(found.coordinate, guess)[1].real), int(np.argmin(np.abs(found.coordinate - guess)))
 
     first, last = sampled(low)[0], sampled(high)[0]
+    if np.isnan(first) or np.isnan(last):
+        return  # nothing is left in the band there: an eigenvalue that passes through infinity
     rounding = (COMPLEX * source.frequency**2) ** (2 if passage.kind == "meeting" else 1)
     if first * last > 0 and min(abs(first), abs(last)) <= rounding:
         # It passes zero at the very end, whichever sign rounding has given it there.
@@ -123,6 +127,8 @@ def _by_square(source: Along, passage: Passage) -> Iterator[Guess]:
         part = first / (first - last) if first != last else 0.5
         t = low + float(np.clip(part, 0.02, 0.98)) * (high - low)
         value, index = sampled(t)
+        if np.isnan(value):
+            return
         # On a basis another look costs nothing beside a step in the full problem.
         if source.whole or k >= 3 or abs(value) <= 1e-6 * max(abs(first), abs(last)):
             found = source.eigenpairs(t)

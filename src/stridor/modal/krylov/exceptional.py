@@ -89,7 +89,8 @@ def _zero(
     for _ in range(20):
         if at_now == at_before:
             return now
-        change = -at_now * (now - before) / (at_now - at_before)
+        with np.errstate(all="ignore"):
+            change = -at_now * (now - before) / (at_now - at_before)
         if not np.isfinite(change) or abs(now + change - mu) > reach:
             return None
         before, at_before = now, at_now

@@ -364,7 +364,8 @@ class _RegionSearch:
         """With those that miss the tolerance improved one by one."""
         # Of zero but for rounding a sharper one is another rounding, the same for several perhaps.
         bad = np.flatnonzero(~(found.error <= self.tolerance) & ~(np.abs(found.values) <= self.still))
-        values, shapes, error = found.values.copy(), found.shapes.copy(), found.error.copy()
+        values, shapes = found.values.astype(complex), found.shapes.astype(complex)  # copies
+        error = found.error.copy()
         for index in bad[:POLISHED]:
             better = polished(problem, complex(values[index]), shapes[:, index], solver=self.solver)
             self.factorisations += 1

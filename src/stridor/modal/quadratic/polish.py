@@ -76,7 +76,7 @@ def biorthogonal(problem: Quadratic, lam: ComplexArray, x: ComplexArray, y: Comp
 
     Between different eigenvalues that holds by itself; a defective one has no such basis and is left as it is.
     """
-    result = y.copy()
+    result = y.astype(complex)
     for group in groups(lam, ALIKE * scale):
         if len(group) < 2:
             continue
