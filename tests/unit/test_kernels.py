@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import pickle
@@ -16,6 +17,7 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
+from numba.core.compiler import Flags
 
 import stridor
 from stridor.contact import curve
@@ -519,3 +521,28 @@ def test_what_runs_on_other_threads_is_private_too():
     defined = [f for f in form.library._final_module.functions if not f.is_declaration]
     assert [f.name for f in defined if "gufunc" in f.name]
     assert {f.linkage.name for f in defined} == {"external", "internal"}
+
+
+def test_options_of_the_compiler_are_compared_as_numba_compares_them():
+    def tables(options):
+        return {name: getattr(options, name) for name in options.options}
+
+    plain, same, said, other = (Flags() for _ in range(4))
+    said.boundscheck = said.boundscheck  # its default, which it does not say else
+    other.nrt = not other.nrt
+    every = (plain, same, said, other, plain.copy(), other.copy())
+    for one, two in itertools.product(every, every):
+        assert (one == two) is (tables(one) == tables(two))
+        if one == two:
+            assert hash(one) == hash(two)
+    assert plain != "plain"
+    assert hash(plain) == hash(tuple(sorted(tables(plain))))  # as numba has it
+
+
+def test_what_makes_arrays_cannot_say_that_it_makes_none():
+    @njit(allocates=False)
+    def mirrored(values):
+        return np.zeros(3)
+
+    with pytest.raises(numba.core.errors.NumbaError, match="Only accept returning of array passed into the function"):
+        mirrored(np.ones(3))

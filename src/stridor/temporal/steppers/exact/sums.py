@@ -25,7 +25,7 @@ from .tables import (
 )
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def modes_at(zeta: Array, poles: Array, time: float, found: Array) -> None:  # pragma: no cover - compiled
     """[Re z; Im z] (2f,) at a time."""
     f = poles.shape[1]
@@ -36,7 +36,7 @@ def modes_at(zeta: Array, poles: Array, time: float, found: Array) -> None:  # p
         found[f + k] = zeta[0, k] * sine + zeta[1, k] * cosine
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True, allocates=False, fastmath=FAST)
 def quadratic_at(packed: Array, number: int, modes: Array) -> float:  # pragma: no cover - compiled
     """A form of modes (2f,), of several (r, ·): the rows of its lower triangle one after the other."""
     at, total = 0, 0.0
@@ -49,7 +49,7 @@ def quadratic_at(packed: Array, number: int, modes: Array) -> float:  # pragma: 
     return total
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True, allocates=False, fastmath=FAST)
 def dot(row: Array, vector: Array) -> float:  # pragma: no cover - compiled
     """A row (n,) on a vector (n,)."""
     total = 0.0
@@ -58,7 +58,7 @@ def dot(row: Array, vector: Array) -> float:  # pragma: no cover - compiled
     return total
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True, allocates=False, fastmath=FAST)
 def row_on(rows: Array, i: int, vector: Array) -> float:  # pragma: no cover - compiled
     """One of some rows (·, n) on a vector (n,)."""
     total = 0.0
@@ -67,7 +67,7 @@ def row_on(rows: Array, i: int, vector: Array) -> float:  # pragma: no cover - c
     return total
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True, allocates=False, fastmath=FAST)
 def product(rows: Array, vector: Array, found: Array) -> None:  # pragma: no cover - compiled
     """Rows (r, n) on a vector (n,): (r,)."""
     for i in range(rows.shape[0]):
@@ -77,7 +77,7 @@ def product(rows: Array, vector: Array, found: Array) -> None:  # pragma: no cov
         found[i] = total
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def slow_at(terms: Array, time: float, found: Array) -> None:  # pragma: no cover - compiled
     """What is slow (S,) at a time."""
     for s in range(terms.shape[1]):
@@ -87,7 +87,7 @@ def slow_at(terms: Array, time: float, found: Array) -> None:  # pragma: no cove
         found[s] = total
 
 
-@njit(cache=True, fastmath={"contract"})
+@njit(cache=True, allocates=False, fastmath={"contract"})
 def followed(
     store: Array, where: IntArray, terms: Array, along_real: Array, along_imag: Array, alone: Array
 ) -> None:  # pragma: no cover - compiled
@@ -132,7 +132,7 @@ def followed(
                     alone[w, i + j] += total
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _still(pair: Array, zeta: Array, time: float) -> float:  # pragma: no cover - compiled
     """The work of a pair of modes whose exponents all but cancel."""
     k, i = int(pair[2]), int(pair[3])
@@ -147,7 +147,7 @@ def _still(pair: Array, zeta: Array, time: float) -> float:  # pragma: no cover 
     return (size * share).real * time
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True, allocates=False, fastmath=FAST)
 def _along(real: Array, imag: Array, w: int, j: int, modes: Array) -> float:  # pragma: no cover - compiled
     f, total = real.shape[2], 0.0
     for k in range(f):
@@ -155,7 +155,7 @@ def _along(real: Array, imag: Array, w: int, j: int, modes: Array) -> float:  # 
     return total
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def forms_at(
     store: Array, where: IntArray, zeta: Array, modes: Array, time: float, along_real: Array, along_imag: Array,
     alone: Array, last: int, found: Array,

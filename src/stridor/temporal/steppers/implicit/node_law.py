@@ -25,7 +25,7 @@ from .arrays import Nodes, State, Work
 
 _OPEN, _STICK, _SLIP = multipliers.OPEN, multipliers.STICK, multipliers.SLIP
 _KIND, _CONSTANT = packed.KIND, packed.CONSTANT
-_solve_contact = njit(cache=True)(multipliers.solve_contact)
+_solve_contact = njit(cache=True, allocates=False)(multipliers.solve_contact)
 
 GOES_ON = 0.5  # of its speed that a slip must keep to be taken as one that goes on without further ado
 FIRST = 4  # sweeps before those that their impulses close join in
@@ -34,7 +34,7 @@ NEWTON_STEPS = 60  # on the force of a spring that opens or closes
 SWEEP_TOLERANCE = 1e-11
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def spring_force(stiffness: float, before: float, after: float) -> tuple[float, float]:  # pragma: no cover - compiled
     """F [N] of a spring whose gap goes from ``before`` to ``after`` [m], and −dF/d after ≥ 0 [N/m]."""
     if before <= 0.0:
@@ -49,7 +49,7 @@ def spring_force(stiffness: float, before: float, after: float) -> tuple[float, 
     return 0.5 * stiffness * after * after / way, 0.5 * stiffness * after * (after - 2.0 * before) / (way * way)
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _solve_spring(
     i: int, step: float, tangent: Array, slip_step: float, nodes: Nodes, stuck: bool, start: float, free: Array,
     new: Array, met: Array,
@@ -83,7 +83,7 @@ def _solve_spring(
     return status
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _solve(
     i: int, sign: float, tangent: Array, step: float, layer: float, nodes: Nodes, stuck: bool, free: Array, new: Array
 ) -> int:  # pragma: no cover - compiled
@@ -110,7 +110,7 @@ def _solve(
     return status
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _relax(i: int, h: float, nodes: Nodes, state: State, work: Work) -> int:  # pragma: no cover - compiled
     """Impulses of node i with those of all others as they are into work.local[0]; its status."""
     d = work.local.shape[1]
@@ -136,7 +136,7 @@ def _relax(i: int, h: float, nodes: Nodes, state: State, work: Work) -> int:  # 
     return status
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _by_kind(
     i: int, h: float, tangent: Array, slip_step: float, nodes: Nodes, stuck: bool, work: Work, free: Array, new: Array
 ) -> int:  # pragma: no cover - compiled
@@ -148,7 +148,7 @@ def _by_kind(
     return _solve(i, sign, tangent, slip_step, 0.0, nodes, stuck, free, new)
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _ahead(at: int, w: Array, work: Work, new: Array) -> float:  # pragma: no cover - compiled
     """Slip velocity behind the step along that before it, over the square of that."""
     d, free = len(new), work.local[1]
@@ -162,13 +162,13 @@ def _ahead(at: int, w: Array, work: Work, new: Array) -> float:  # pragma: no co
     return ahead / before if before > 0.0 else 0.0
 
 
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
+@njit(cache=True, allocates=False, fastmath={"reassoc", "contract", "nsz", "arcp"})
 def _add(total: Array, row: Array, factor: float) -> None:  # pragma: no cover - compiled
     for k in range(len(total)):
         total[k] += factor * row[k]
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def total_of(nodes: Nodes, work: Work) -> None:  # pragma: no cover - compiled
     """work.total from work.free and the impulses."""
     for k in range(len(work.free)):
@@ -178,7 +178,7 @@ def total_of(nodes: Nodes, work: Work) -> None:  # pragma: no cover - compiled
             _add(work.total, nodes.delassus[k], work.impulse[k])
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _stays_open(i: int, d: int, nodes: Nodes, work: Work) -> bool:  # pragma: no cover - compiled
     """Whether a node without an impulse needs none."""
     if work.impulse[i * d] != 0.0 or nodes.kept[i] or work.total[i * d] < 0.0:
@@ -186,7 +186,7 @@ def _stays_open(i: int, d: int, nodes: Nodes, work: Work) -> bool:  # pragma: no
     return nodes.stiffness[i] == 0.0 or work.start[i] >= 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _pack(count: int, d: int, nodes: Nodes, work: Work) -> None:  # pragma: no cover - compiled
     """The Delassus operator of the chosen nodes alone into work.packed, where it is not there from the step before."""
     same = work.kept_count[0] == count
@@ -204,7 +204,7 @@ def _pack(count: int, d: int, nodes: Nodes, work: Work) -> None:  # pragma: no c
                     out[b * d + k] = row[work.chosen[b] * d + k]
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _sweeps(
     count: int, limit: int, h: float, nodes: Nodes, state: State, work: Work
 ) -> tuple[bool, int]:  # pragma: no cover - compiled
@@ -243,7 +243,7 @@ def _sweeps(
     return settled, sweep
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def solve_nodes(limit: int, h: float, nodes: Nodes, state: State, work: Work) -> int:  # pragma: no cover - compiled
     """Impulses into work.impulse, from those that are there; sweeps done, limit + 1 where they did not settle.
 

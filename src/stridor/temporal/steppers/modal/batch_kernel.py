@@ -43,7 +43,7 @@ class BatchRecord(NamedTuple):
     watch_lift: Array
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def _member_state(s: LoopState, lane: int) -> LoopState:  # pragma: no cover - compiled
     """The rows of one member."""
     return LoopState(
@@ -64,7 +64,7 @@ def _member_state(s: LoopState, lane: int) -> LoopState:  # pragma: no cover - c
     )
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def _member_contacts(x: ContactArrays, friction: Array) -> ContactArrays:  # pragma: no cover - compiled
     """The contacts with one member's friction."""
     return ContactArrays(
@@ -72,13 +72,13 @@ def _member_contacts(x: ContactArrays, friction: Array) -> ContactArrays:  # pra
     )
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def _member_forcing(x: BatchForcing, lane: int) -> Forcing:  # pragma: no cover - compiled
     """What acts on one member."""
     return Forcing(x.loads[:, lane], x.increments[:, lane], x.own, x.own, x.own, x.lift)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def keep_contacts(
     at: int, lane: int, contacts: ContactArrays, scheme: Scheme, state: LoopState, scratch: Scratch, record: BatchRecord
 ) -> None:  # pragma: no cover - compiled
@@ -95,7 +95,7 @@ def keep_contacts(
         record.before[lane, 0, p], record.before[lane, 1, p] = state.motion[0, p], state.motion[1, p]
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def keep_point(
     at: int, lane: int, w: int, su: float, sq: float, sd: float, increments: Array, scheme: Scheme, record: BatchRecord
 ) -> None:  # pragma: no cover - compiled
@@ -111,7 +111,7 @@ def keep_point(
     record.watch[at, lane, w, 2] = 2.0 * (sd / dt - sq) / (dt * s)
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _keep_watched(
     k: int, at: int, modal: BatchModal, fields: BatchFields, scheme: Scheme, forcing: BatchForcing, record: BatchRecord
 ) -> None:  # pragma: no cover - compiled
@@ -123,7 +123,7 @@ def _keep_watched(
             keep_point(at, lane, w, su, sq, sd, forcing.increments[k, lane], scheme, record)
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _give_up(lane: int, fields: BatchFields, state: LoopState) -> None:  # pragma: no cover - compiled
     """Let a member rest whose motion is no longer finite: nothing in its lane moves any more."""
     fields.ud[:, lane] = 0.0
@@ -135,7 +135,7 @@ def _give_up(lane: int, fields: BatchFields, state: LoopState) -> None:  # pragm
     state.rate[:] = 0.0
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def finite_rows(state: LoopState) -> bool:  # pragma: no cover - compiled
     """Whether the rows of a member are."""
     total = 0.0
@@ -144,7 +144,7 @@ def finite_rows(state: LoopState) -> bool:  # pragma: no cover - compiled
     return math.isfinite(total)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, allocates=False, nogil=True)
 def run_batch(
     steps: int,
     done: int,

@@ -52,7 +52,7 @@ class BatchFields(NamedTuple):
     coefficients: Array
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def _mode(
     ud: int, q: int, constant: int, stream: int, i: int, at: int, d: Any, keep: bool, acts: bool,
     memory: float, gain: float,
@@ -71,7 +71,7 @@ def _mode(
     return plus(u, new)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def _one_row(m: BatchModal, f: BatchFields, b: int, keep: bool, acts: bool) -> None:  # pragma: no cover - compiled
     """A block with one contact row; two sums, so that neither waits for the other."""
     ud, q, constant, stream = address(f.ud), address(f.q), address(f.constant), address(m.stream)
@@ -91,7 +91,7 @@ def _one_row(m: BatchModal, f: BatchFields, b: int, keep: bool, acts: bool) -> N
     store(pull, row, plus(load(pull, row), plus(y0, y1)))
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def _three_rows(m: BatchModal, f: BatchFields, b: int, keep: bool, acts: bool) -> None:  # pragma: no cover - compiled
     """A block with more, by the last three of them."""
     ud, q, constant, stream = address(f.ud), address(f.q), address(f.constant), address(m.stream)
@@ -114,7 +114,7 @@ def _three_rows(m: BatchModal, f: BatchFields, b: int, keep: bool, acts: bool) -
     store(pull, r2, plus(load(pull, r2), y2))
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _push_others(m: BatchModal, f: BatchFields, b: int) -> None:  # pragma: no cover - compiled
     """d += drive Σ p·row over the contact rows of a block before its last three."""
     ud, push, driven, count = address(f.ud), address(f.push), address(m.driven), m.driven.shape[1]
@@ -125,7 +125,7 @@ def _push_others(m: BatchModal, f: BatchFields, b: int) -> None:  # pragma: no c
             store(ud, 2 * i + 1, plus_times(load(ud, 2 * i + 1), number(driven, row * count + i), p))
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _pull_others(m: BatchModal, f: BatchFields, b: int) -> None:  # pragma: no cover - compiled
     """Σ row·(u + d) over the same rows."""
     ud, pull, plain, count = address(f.ud), address(f.pull), address(m.plain), m.plain.shape[1]
@@ -137,7 +137,7 @@ def _pull_others(m: BatchModal, f: BatchFields, b: int) -> None:  # pragma: no c
         store(pull, row, y)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def _block(m: BatchModal, f: BatchFields, b: int, keep: bool, acts: bool) -> None:  # pragma: no cover - compiled
     if m.rows_at[b + 1] - m.rows_at[b] == 1:
         _one_row(m, f, b, keep, acts)
@@ -147,7 +147,7 @@ def _block(m: BatchModal, f: BatchFields, b: int, keep: bool, acts: bool) -> Non
         _pull_others(m, f, b)
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def batch_pass(m: BatchModal, f: BatchFields, keep: bool) -> None:  # pragma: no cover - compiled
     """Add contact forces (push), complete t_{n+1}, predict t_{n+2} and its contact rows (pull)."""
     f.pull[:] = 0.0
@@ -164,7 +164,7 @@ def batch_pass(m: BatchModal, f: BatchFields, keep: bool) -> None:  # pragma: no
             _block(m, f, b, False, False)
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def batch_constant(m: BatchModal, f: BatchFields) -> None:  # pragma: no cover - compiled
     """The part of d that loads and supports make."""
     constant, coefficients, auxiliary = address(f.constant), address(f.coefficients), address(m.auxiliary)
@@ -176,7 +176,7 @@ def batch_constant(m: BatchModal, f: BatchFields) -> None:  # pragma: no cover -
         store(constant, i, total)
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def batch_watch(m: BatchModal, f: BatchFields, out: Array) -> None:  # pragma: no cover - compiled
     """Watched rows of u, of q and of d with the contact forces in it: out (3w, L)."""
     ud, q, push, sums = address(f.ud), address(f.q), address(f.push), address(out)

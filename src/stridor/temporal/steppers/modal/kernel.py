@@ -24,7 +24,7 @@ from .stage import Forcing, LoopState, Scratch, accumulate, advance_rows, contac
 DONE, NEW_ROWS, OFF_LINE, NOT_FINITE = range(4)
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True, allocates=False, fastmath=FAST)
 def _record(
     kinetic: float,
     elastic: float,
@@ -88,7 +88,7 @@ def _record(
         record.energies[at, 2 + j] = state.works[j]
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _leaves_segment(contacts: ContactArrays, state: LoopState) -> bool:  # pragma: no cover - compiled
     for c in range(contacts.kind.shape[0]):
         if contacts.kind[c] != 0:
@@ -98,7 +98,7 @@ def _leaves_segment(contacts: ContactArrays, state: LoopState) -> bool:  # pragm
     return False
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _all_finite(state: LoopState) -> bool:  # pragma: no cover - compiled
     total = 0.0
     for r in range(state.value.shape[0] - 1):
@@ -106,7 +106,7 @@ def _all_finite(state: LoopState) -> bool:  # pragma: no cover - compiled
     return bool(np.isfinite(total))
 
 
-@njit(cache=True, fastmath=CAREFUL)
+@njit(cache=True, allocates=False, fastmath=CAREFUL)
 def run_modal(
     steps: int,
     modal: ModalArrays,

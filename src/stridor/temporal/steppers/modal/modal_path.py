@@ -41,7 +41,7 @@ class Addresses(NamedTuple):
     width: int
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True, allocates=False, fastmath=FAST)
 def modal_energies(modal: ModalArrays, scheme: Scheme, u: Array, q: Array) -> tuple[float, float]:
     # pragma: no cover - compiled
     """Kinetic and elastic energy at t_{n−1/2}: ½ q·q and ½ u_n·ω²·u_{n−1}."""
@@ -53,7 +53,7 @@ def modal_energies(modal: ModalArrays, scheme: Scheme, u: Array, q: Array) -> tu
     return 0.5 * kinetic, 0.5 * elastic
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def _advanced(a: Addresses, i: int, d: Any, q: Any, memory: float, gain: float) -> Any:  # pragma: no cover - compiled
     """Complete the modes of lane i to t_{n+1} with the increment d and predict them: u + d of the next step."""
     u = plus(load(a.u, i), d)
@@ -65,7 +65,7 @@ def _advanced(a: Addresses, i: int, d: Any, q: Any, memory: float, gain: float) 
     return plus(u, d)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def _one_row(
     a: Addresses, scheme: Scheme, first: int, last: int, force: Array, predicted: Array, row: int
 ) -> float:  # pragma: no cover - compiled
@@ -83,7 +83,7 @@ def _one_row(
     return total(dissipated)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def _three_rows(
     a: Addresses, scheme: Scheme, first: int, last: int, force: Array, predicted: Array, r0: int, r1: int, r2: int
 ) -> float:  # pragma: no cover - compiled
@@ -108,7 +108,7 @@ def _three_rows(
     return total(dissipated)
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _push_others(
     a: Addresses, first: int, last: int, force: Array, chosen: IntArray, at: int, end: int
 ) -> None:  # pragma: no cover - compiled
@@ -121,7 +121,7 @@ def _push_others(
                 store(a.d, i, plus_product(load(a.d, i), load(a.drive, i), times(p, load(row, i))))
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _pull_others(
     a: Addresses, first: int, last: int, predicted: Array, chosen: IntArray, at: int, end: int
 ) -> None:  # pragma: no cover - compiled
@@ -133,7 +133,7 @@ def _pull_others(
         predicted[chosen[k]] += total(y)
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def modal_pass(
     modal: ModalArrays, scheme: Scheme, rows: ModalRows, force: Array, fields: Fields, predicted: Array
 ) -> float:  # pragma: no cover - compiled
@@ -166,7 +166,7 @@ def modal_pass(
     return dissipated / (scheme.s * scheme.s)
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def complete_modal(
     modal: ModalArrays, rows: ModalRows, force: Array, fields: Fields, loads_at: int
 ) -> None:  # pragma: no cover - compiled
@@ -179,7 +179,7 @@ def complete_modal(
         out[i] = d[i] + drive[i] * push
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def modal_constant(modal: ModalArrays, rows: ModalRows, fields: Fields, loads_at: int) -> None:
     # pragma: no cover - compiled
     """Part of d that loads and supports make."""

@@ -37,8 +37,8 @@ from .operators import FINITE, ContactArrays
 _STICK, _SLIP = multipliers.STICK, multipliers.SLIP
 _FINITE = FINITE
 
-_solve_contact = njit(cache=True)(multipliers.solve_contact)
-_solve_kept = njit(cache=True)(multipliers.solve_kept)
+_solve_contact = njit(cache=True, allocates=False)(multipliers.solve_contact)
+_solve_kept = njit(cache=True, allocates=False)(multipliers.solve_kept)
 
 SWEEP_LIMIT = 500
 SWEEP_TOLERANCE = 1e-12
@@ -94,7 +94,7 @@ class Forcing(NamedTuple):
     lift: Array
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def _local_weights(
     c: int, contacts: ContactArrays, state: LoopState, scratch: Scratch
 ) -> tuple[int, bool]:  # pragma: no cover - compiled
@@ -121,7 +121,7 @@ def _local_weights(
     return 10, on_line
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def _solve_all(
     contacts: ContactArrays, scheme: Scheme, compliance: Array, state: LoopState, scratch: Scratch
 ) -> int:  # pragma: no cover - compiled
@@ -181,7 +181,7 @@ def _solve_all(
     return -1
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def reference(c: int, a: int, contacts: ContactArrays, state: LoopState) -> float:  # pragma: no cover - compiled
     """Coordinate [m] of row a of a finite-sliding contact in the reference configuration."""
     if a < 2:
@@ -193,7 +193,7 @@ def reference(c: int, a: int, contacts: ContactArrays, state: LoopState) -> floa
     return 0.0
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def _gap_before(
     c: int, contacts: ContactArrays, scheme: Scheme, state: LoopState, scratch: Scratch
 ) -> float:  # pragma: no cover - compiled
@@ -208,7 +208,7 @@ def _gap_before(
     return gap
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def _local_problem(
     c: int,
     base: int,
@@ -237,7 +237,7 @@ def _local_problem(
     return gap, slip, w_nn, w_nt, w_tt
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def contact_stage(
     k: int,
     contacts: ContactArrays,
@@ -261,7 +261,7 @@ def contact_stage(
     return off
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def _count(c: int, later: float, state: LoopState) -> None:  # pragma: no cover - compiled
     """Statistics of one contact; later: its slip speed [m/s] over the step."""
     row = state.statistics[c]
@@ -281,7 +281,7 @@ def _count(c: int, later: float, state: LoopState) -> None:  # pragma: no cover 
     row[MAX_TANGENTIAL] = max(row[MAX_TANGENTIAL], abs(state.tangential[c]))
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def count_contacts(contacts: ContactArrays, state: LoopState, scratch: Scratch) -> None:
     # pragma: no cover - compiled
     """The statistics of `accumulate` alone, of contacts that slide little."""
@@ -289,7 +289,7 @@ def count_contacts(contacts: ContactArrays, state: LoopState, scratch: Scratch) 
         _count(c, scratch.moved[contacts.base[c] + 1], state)
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def accumulate(
     k: int,
     contacts: ContactArrays,
@@ -351,7 +351,7 @@ def accumulate(
         works[DAMPING] += damped * velocity * dt
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def forces_of(
     k: int, scheme: Scheme, forcing: Forcing, state: LoopState, out: Array
 ) -> bool:  # pragma: no cover - compiled
@@ -376,7 +376,7 @@ def forces_of(
     return changed
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, allocates=False, inline="always")
 def advance_rows(
     k: int, scheme: Scheme, forcing: Forcing, state: LoopState, scratch: Scratch
 ) -> None:  # pragma: no cover - compiled

@@ -28,7 +28,7 @@ _CONSTANT, _STICKING, _KIND, _KINETIC = packed.CONSTANT, packed.STICKING, packed
 NEWTON_STEPS = 60
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _axes(a: float, b: float, c: float) -> tuple[float, float, float, float]:  # pragma: no cover - compiled
     """Eigenvalues of [[a, b], [b, c]], larger first, and cosine and sine of the first axis."""
     if b == 0.0:
@@ -41,7 +41,7 @@ def _axes(a: float, b: float, c: float) -> tuple[float, float, float, float]:  #
     return large, max((a * c - b * b) / large, 0.0), math.cos(angle), math.sin(angle)
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def solve_disc(
     g: float,
     s1: float,
@@ -81,7 +81,7 @@ def solve_disc(
     return normal, cosine * t1 - sine * t2, sine * t1 + cosine * t2, _SLIP
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _slide(
     g: float,
     s1: float,

@@ -11,7 +11,7 @@ from .node_table import NodeTable
 NEW_ROWS, OFF_LINE = 2, 3
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _mix(lo: int, hi: int, col: IntArray, base: Array, work: NodeScratch, out: Array) -> None:
     # pragma: no cover - compiled
     """Entries lo … hi − 1 of out: those of base (l, 10) times the weights of normal and tangent."""
@@ -23,7 +23,7 @@ def _mix(lo: int, hi: int, col: IntArray, base: Array, work: NodeScratch, out: A
         out[e, 0], out[e, 1] = n, t
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _find_foot(k: int, x: Array, u: Array, table: NodeTable, nodes: NodeState, work: NodeScratch) -> bool:
     # pragma: no cover - compiled
     """Foot of curve k where the supports are at x and the structure at u; whether it is on the line."""
@@ -48,7 +48,7 @@ def _find_foot(k: int, x: Array, u: Array, table: NodeTable, nodes: NodeState, w
     return on_line
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def follow_feet(x: Array, u: Array, table: NodeTable, nodes: NodeState, work: NodeScratch) -> int:
     # pragma: no cover - compiled
     """Rows of the points that slide finitely, of supports at x (p,) and a structure at u (size,), into the table. After

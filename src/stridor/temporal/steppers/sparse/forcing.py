@@ -75,7 +75,7 @@ class StepWork(NamedTuple):
     power: Array
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def dot(ptr: IntArray, col: IntArray, val: Array, r: int, x: Array) -> float:  # pragma: no cover - compiled
     """One csr row times x."""
     total = 0.0
@@ -84,7 +84,7 @@ def dot(ptr: IntArray, col: IntArray, val: Array, r: int, x: Array) -> float:  #
     return total
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _set_push(k: int, step: float, beta2: float, g: Forcing, state: LoopState, after: Array, push: Array) -> None:
     # pragma: no cover - compiled
     """Loads and supports of step k into push, if they changed; after (p,) takes q of the supports at t_{n+1}."""
@@ -124,7 +124,7 @@ def _set_push(k: int, step: float, beta2: float, g: Forcing, state: LoopState, a
         push[i] = base[i]
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _cubic_forces(g: Forcing, f: Fields, state: LoopState, force: Array) -> None:  # pragma: no cover - compiled
     """Forces of the cubic springs at t_n, against push; force (s,) keeps them for their work."""
     for e in range(g.cubic_col.shape[0]):
@@ -138,7 +138,7 @@ def _cubic_forces(g: Forcing, f: Fields, state: LoopState, force: Array) -> None
             f.push[g.cubic_col[e]] -= g.cubic_val[e] * force[s]
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def begin_step(k: int, a: Structure, f: Fields, g: Forcing, state: LoopState, w: StepWork) -> None:
     # pragma: no cover - compiled
     """Forces of step k into push, and every row on q_n that the works of the step need."""
@@ -162,7 +162,7 @@ def begin_step(k: int, a: Structure, f: Fields, g: Forcing, state: LoopState, w:
                 w.coupling[1, p] += g.damping[p, e] * f.q[g.near[e]]
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def works_of_step(k: int, a: Structure, f: Fields, g: Forcing, state: LoopState, w: StepWork) -> None:
     # pragma: no cover - compiled
     """Works of loads, cubic springs and supports over the step, with velocities at t_n."""
@@ -186,7 +186,7 @@ def works_of_step(k: int, a: Structure, f: Fields, g: Forcing, state: LoopState,
     _support_works(a, g, state, w.after, w.coupling, f, w.sent)
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _support_works(
     a: Structure, g: Forcing, state: LoopState, after: Array, before: Array, f: Fields, contact: Array
 ) -> None:  # pragma: no cover - compiled

@@ -48,7 +48,7 @@ DONE, NOT_FINITE = 0, 1
 
 # The functions of the contacts are called in one place and become part of it: handing a hundred arrays on costs more
 # than a few contacts do.
-@njit(cache=True, forceinline=True)
+@njit(cache=True, allocates=False, forceinline=True)
 def _correct(
     a: Structure, f: Fields, table: NodeTable, nodes: NodeState, work: NodeScratch
 ) -> float:  # pragma: no cover - compiled
@@ -72,7 +72,7 @@ def _correct(
     return extra
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, allocates=False, forceinline=True)
 def _solve_contacts(
     increments: Array, a: Structure, f: Fields, table: NodeTable, nodes: NodeState, work: NodeScratch, state: LoopState,
     w: StepWork,
@@ -88,7 +88,7 @@ def _solve_contacts(
     return count
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, allocates=False, forceinline=True)
 def _after_contacts(
     count: int, increments: Array, a: Structure, table: NodeTable, nodes: NodeState, work: NodeScratch,
     state: LoopState, w: StepWork,
@@ -110,7 +110,7 @@ def _after_contacts(
     return normal, friction
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, allocates=False, forceinline=True)
 def _forces_of_step(
     increments: Array, a: Structure, f: Fields, x: Unsymmetric, b: StepMatrix, table: NodeTable, nodes: NodeState,
     work: NodeScratch, state: LoopState, w: StepWork,
@@ -152,7 +152,7 @@ def _forces_of_step(
     return normal, friction, extra
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def run_steps(
     steps: int, a: Structure, f: Fields, x: Unsymmetric, b: StepMatrix, g: Forcing, table: NodeTable, nodes: NodeState,
     work: NodeScratch, state: LoopState, w: StepWork, record: Record,

@@ -25,7 +25,7 @@ from .disc import solve_disc
 from .node_table import NodeTable
 
 _OPEN, _STICK, _SLIP = multipliers.OPEN, multipliers.STICK, multipliers.SLIP
-_solve_contact = njit(cache=True)(multipliers.solve_contact)
+_solve_contact = njit(cache=True, allocates=False)(multipliers.solve_contact)
 
 SWEEP_LIMIT = 1000
 SWEEP_TOLERANCE = 1e-11
@@ -66,7 +66,7 @@ class NodeScratch(NamedTuple):
     tangent: Array
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, allocates=False, forceinline=True)
 def _push(i: int, change: Array, table: NodeTable, correction: Array) -> None:  # pragma: no cover - compiled
     """Forces (d,) on node i into the correction."""
     for p in range(table.push_ptr[i], table.push_ptr[i + 1]):
@@ -76,7 +76,7 @@ def _push(i: int, change: Array, table: NodeTable, correction: Array) -> None:  
         correction[table.push_col[p]] += total
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, allocates=False, forceinline=True)
 def _take_in(
     i: int, count: int, increments: Array, ratio: Array, table: NodeTable, state: NodeState, work: NodeScratch
 ) -> int:  # pragma: no cover - compiled
@@ -94,7 +94,7 @@ def _take_in(
     return count + 1
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, allocates=False, forceinline=True)
 def _solve_node(
     i: int,
     sign: float,
@@ -122,7 +122,7 @@ def _solve_node(
     return status
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, allocates=False, forceinline=True)
 def _relax(
     i: int, step: float, new: Array, table: NodeTable, state: NodeState, work: NodeScratch
 ) -> int:  # pragma: no cover - compiled
@@ -166,7 +166,7 @@ def _relax(
     return status
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, allocates=False, forceinline=True)
 def _sweeps(
     count: int, limit: int, step: float, status: IntArray, table: NodeTable, state: NodeState, work: NodeScratch
 ) -> int:  # pragma: no cover - compiled
@@ -192,7 +192,7 @@ def _sweeps(
     return limit + 1
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, allocates=False, forceinline=True)
 def _gap_before(
     i: int,
     gap: float,
@@ -213,7 +213,7 @@ def _gap_before(
     return gap
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, allocates=False, forceinline=True)
 def solve_nodes(
     step: float, ratio: Array, x: Array, increments: Array, rate: Array, table: NodeTable, state: NodeState,
     work: NodeScratch, status: IntArray,
@@ -270,7 +270,7 @@ def solve_nodes(
     return count, done
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, allocates=False, forceinline=True)
 def contact_power(
     count: int, beta2: float, velocity: Array, table: NodeTable, state: NodeState, work: NodeScratch
 ) -> tuple[float, float]:  # pragma: no cover - compiled
@@ -293,7 +293,7 @@ def contact_power(
     return normal, friction
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, allocates=False, forceinline=True)
 def slip_over_step(i: int, ratio: Array, increments: Array, table: NodeTable, state: NodeState, work: NodeScratch) -> (
     float
 ):  # pragma: no cover - compiled

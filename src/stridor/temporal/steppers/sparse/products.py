@@ -55,7 +55,7 @@ class Structure(NamedTuple):
     numbers: Array
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True, allocates=False, fastmath=FAST)
 def _rows1(m: Blocks, x: Array, y: Array, lo: int, hi: int) -> None:  # pragma: no cover - compiled
     ptr, col, val = m.ptr, m.col, m.val
     for i in range(lo, hi):
@@ -69,7 +69,7 @@ def _rows1(m: Blocks, x: Array, y: Array, lo: int, hi: int) -> None:  # pragma: 
         y[i] += total
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def add_rows(m: Blocks, x: Array, y: Array, lo: int, hi: int) -> None:  # pragma: no cover - compiled
     """Add to y what the block rows lo … hi − 1 give in the product of a symmetric matrix with x."""
     width = m.val.shape[1]
@@ -81,7 +81,7 @@ def add_rows(m: Blocks, x: Array, y: Array, lo: int, hi: int) -> None:  # pragma
         _rows1(m, x, y, lo, hi)
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True, allocates=False, fastmath=FAST)
 def _complete(a: Structure, f: Fields, y: Array, lo: int, hi: int) -> float:  # pragma: no cover - compiled
     """Places lo … hi − 1 to t_{n+1}; the power of works wanted, v·C_d v or v·(y + C_d v)."""
     beta2, forth, back = a.numbers[1], a.numbers[2], a.numbers[3]
@@ -108,7 +108,7 @@ def _complete(a: Structure, f: Fields, y: Array, lo: int, hi: int) -> float:  # 
     return power
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _part(a: Structure, f: Fields, y: Array, lo: int, hi: int, free: int) -> float:  # pragma: no cover - compiled
     """Block rows lo … hi − 1, completed from the row ``free`` on."""
     width = f.u.shape[0] // (a.stiffness.ptr.shape[0] - 1)
@@ -127,7 +127,7 @@ def _part(a: Structure, f: Fields, y: Array, lo: int, hi: int, free: int) -> flo
     return power
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, allocates=False, parallel=True)
 def _two_parts(
     k_ptr: IntArray, k_col: IntArray, k_val: Array, c_ptr: IntArray, c_col: IntArray, c_val: Array, keep: Array,
     kick: Array, factor: Array, mass: Array, damping: Array, parts: IntArray, flags: IntArray, numbers: Array,
@@ -148,7 +148,7 @@ def _two_parts(
             power[8] = _part(a, f, y[1], parts[0], blocks, parts[1])
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def advance(a: Structure, f: Fields, power: Array) -> float:  # pragma: no cover - compiled
     """One step without contact forces: u and q to t_{n+1}; the power wanted. power (16,) is work space."""
     blocks = a.stiffness.ptr.shape[0] - 1
@@ -171,7 +171,7 @@ def advance(a: Structure, f: Fields, power: Array) -> float:  # pragma: no cover
     return power[0] + power[8] + _complete(a, f, second, cut * width, reach * width)
 
 
-@njit(cache=True, fastmath=FAST)
+@njit(cache=True, allocates=False, fastmath=FAST)
 def stored_energies(a: Structure, f: Fields) -> tuple[float, float]:  # pragma: no cover - compiled
     """½ qᵀMq and ½ u_nᵀK u_{n−1} at t_{n−1/2} [J]; costs one product."""
     blocks = a.stiffness.ptr.shape[0] - 1

@@ -50,7 +50,7 @@ class Record(NamedTuple):
     watch_lift: Array
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def energies(a: Structure, f: Fields, b: StepMatrix, g: Forcing, state: LoopState, row: Array) -> None:
     # pragma: no cover - compiled
     """Kinetic and elastic energy half a step before t_n and the works up to there into row (7,) or (9,)."""
@@ -76,7 +76,7 @@ def energies(a: Structure, f: Fields, b: StepMatrix, g: Forcing, state: LoopStat
     row[0], row[1] = kinetic, elastic + state.works[CUBIC]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True, allocates=False, forceinline=True)
 def statistics(
     count: int, ratio: Array, step: float, increments: Array, table: NodeTable, nodes: NodeState, work: NodeScratch,
     status: IntArray, state: LoopState, sums: Array,
@@ -114,7 +114,7 @@ def statistics(
         kept[MAX_TANGENTIAL] = max(kept[MAX_TANGENTIAL], abs(row[1]))
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def _record_contacts(
     beta2: float, velocity: Array, table: NodeTable, nodes: NodeState, work: NodeScratch, status: IntArray, sums: Array,
     row: int, record: Record, node_row: int,
@@ -160,7 +160,7 @@ def _record_contacts(
             out[c, REC_SLIP] = sums[c, 4] / sums[c, 3]
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def begin_record(
     a: Structure, f: Fields, b: StepMatrix, g: Forcing, state: LoopState, w: StepWork, record: Record
 ) -> bool:  # pragma: no cover - compiled
@@ -173,7 +173,7 @@ def begin_record(
     return bool(np.isfinite(record.energies[at, 0] + record.energies[at, 1]))
 
 
-@njit(cache=True)
+@njit(cache=True, allocates=False)
 def end_record(
     a: Structure, f: Fields, table: NodeTable, nodes: NodeState, work: NodeScratch, state: LoopState, w: StepWork,
     record: Record,
