@@ -23,6 +23,7 @@ from ..modal.full import ParametricOnsets, full_modes, full_onsets
 from ..modal.onsets import Onsets
 from ..modal.onsets import onsets as solve_onsets
 from ..modal.over_friction import modes_of_band, onsets_of_band
+from ..modal.painleve import steps_undetermined
 from ..modal.receptance_modes import prepare
 from ..modal.source import by_receptance, require_full
 from ..sliding import taken_as_closed
@@ -325,9 +326,10 @@ def simulate(
     if work.given is not None:
         marks["fingerprint"] = fingerprint(work.given, mu)
     system, phases, settings = work.structured("simulate", mu), phases_of(work), settings_of(work)
-    if notes := [*(() if mu is None else work.one_for_all), *system.tie_words]:
-        marks["notes"] = notes
     require_pressed_in_time(work, system, "simulate")
+    beyond = steps_undetermined(settings.system(system), mu, work.options)
+    if notes := [*(() if mu is None else work.one_for_all), *system.tie_words, *([beyond] if beyond else [])]:
+        marks["notes"] = notes
     check_extent(work, system)
 
     def told(run: Trajectory) -> Trajectory:
@@ -351,6 +353,8 @@ def simulate(
         part = getattr(error, "trajectory", None)
         if part is not None:
             error.trajectory = told(part)  # type: ignore[attr-defined]
+        if beyond:
+            error.args = (f"{error}; {beyond}",)
         raise
     return told(result)
 

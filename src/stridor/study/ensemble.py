@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..errors import CaseError
+from ..modal.painleve import steps_undetermined
 from ..sliding import full_motion
 from ..system import System
 from ..temporal.ensembles import EnsembleOutcome, march_all
@@ -95,7 +96,10 @@ def ensemble(
     )  # fmt: skip
     found = _modes(work, plan) if modes else UnstableMap(None, (), ())
     made = provenance(work, "ensemble", time.perf_counter() - started, **_asked(values, grid, sweep, swept, window))
-    return _result(work, system, plan, seen, outcome, found, window, made)
+    result = _result(work, system, plan, seen, outcome, found, window, made)
+    highest = None if np.isnan(plan.rows[:, 0]).all() else float(np.nanmax(plan.rows[:, 0]))
+    beyond = steps_undetermined(settings.system(system), highest, work.options)
+    return replace(result, notes=(*result.notes, beyond)) if beyond else result
 
 
 def _check_window(work: Workspace, system: System, settings: Settings, window: float) -> None:
