@@ -36,7 +36,7 @@ from ..temporal.simulate import simulate as march
 from ..temporal.trajectory import Trajectory
 from ..typing import Array
 from .along import onsets_along
-from .asked import require_band, require_count, require_frequency, require_friction, require_range
+from .asked import require_band, require_choice, require_count, require_frequency, require_friction, require_range
 from .body_modes import BodyModes, body_modes
 from .description import Description, describe
 from .fingerprint import check_restart, fingerprint
@@ -94,6 +94,7 @@ def modes(
     require_frequency(max_frequency_hz)
     if count is not None:
         require_count(count, "count")
+    require_choice(vectors, "vectors", (False, True, "right"))
     work = Workspace.of(problem)
     values, system = (_own(work) if mu is None else (mu, None))
     damped = work.modal.damped if damped is None else damped
@@ -253,6 +254,8 @@ def onsets(
     that is none.
     """
     if along is not None:
+        if not isinstance(along, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise CaseError("along", along, "the path of a number of the case, or a parameter of its matrices")
         case = Workspace.of(problem).case("along")
         if along != MU or MU in case.parameters:
             return onsets_along(case, along, friction_range, max_frequency_hz=max_frequency_hz)

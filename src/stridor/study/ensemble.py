@@ -21,7 +21,7 @@ from ..temporal.simulate import Progress, step_of
 from ..temporal.trajectory import Trajectory
 from ..typing import Array, IntArray
 from .analyses import check_extent
-from .asked import require_count
+from .asked import require_choice, require_count
 from .ensemble_modes import UnstableMap, unstable_modes
 from .ensemble_numbers import LEAST_RECORDS, MemberNumbers, Observable, last_phase, numbers_of, observable_of
 from .ensemble_result import AXES, Ensemble
@@ -73,6 +73,7 @@ def ensemble(
     cannot be had, and what `simulate` raises for all members.
     """
     started = time.perf_counter()
+    require_choice(initial, "initial", ("rest", "steady-sliding", None))
     if cores is not None:
         require_count(cores, "cores", more=", or None for all")
     work = Workspace.of(problem)
