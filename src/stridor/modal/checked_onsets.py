@@ -151,11 +151,10 @@ def _sentence(found: Onsets, start: Growing, end: Growing, between: Between) -> 
     if not (start.complete and end.complete):
         sentence = start.sentence if not start.complete else end.sentence
         return f"{NOT_COMPLETE}: {numbers}, as the onsets say, but {sentence}"
-    looked = f", which lead to all that grows at {between.looked} values between" if between.looked else ""
     return (
         f"{CHECKED} {'both ends' if start.sought else 'the high end'}: {numbers}, and each of them goes back to an "
         f"onset listed or grew from the start.{_left_words(found, start, end)}{_parted_words(found, start, end)} "
-        f"{end.sentence} What grows and ends again between them rests on the branches followed{looked}."
+        f"{end.sentence} What grows and ends again between them rests on the branches followed.{between.words}"
     )
 
 
