@@ -113,6 +113,27 @@ def test_nor_of_many_more():
     assert whole >= 1000, (lack, whole)
 
 
+@pytest.mark.parametrize(("share", "free"), [(5e-7, 0), (5e-7, 1), (5e-6, 1)])
+def test_a_slow_pair_that_grows_beside_a_free_body_has_its_onset_and_has_not_left_the_band(share, free):
+    """The mass between two springs at ±30°, which flutters from μ = 3/4 on, slow beside an oscillator of 1 rad/s."""
+    n = 3 + free
+    stiffness = np.zeros((n, n))
+    stiffness[0, 0] = 1.0
+    for degrees, k in ((150, 2 / 3 * (2 - 3**0.5)), (30, 2 / 3 * (2 + 3**0.5))):
+        along = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
+        stiffness[1:3, 1:3] += share**2 * k * np.outer(along, along)
+    contact = {
+        "normal": np.eye(n)[2], "tangent": np.eye(n)[1], "stiffness": 4 / 3 * share**2, "slip": 1.0,
+        "friction": {"law": "coulomb", "coefficient": 0.9},
+    }  # fmt: skip
+    system = System.from_matrices(np.eye(n), np.zeros((n, n)), stiffness, contacts={"c": contact})
+    found = st.onsets(system, (0.0, 1.0), max_frequency_hz=1.3 / (2 * np.pi))
+    assert [o.mu for o in found] == pytest.approx([0.75], rel=1e-9)
+    assert "left the band" not in found.completeness
+    unsought = "At μ = 1, 1 branch grows below 2.07e-07 Hz, where none was sought beside motions as a whole."
+    assert (unsought in found.completeness) == (free == 1 and share == 5e-7)
+
+
 @pytest.mark.parametrize("skew", [0.0, 0.3])
 @pytest.mark.parametrize("slow", [(), (2e-6,), (3e-6, 1e-6)])
 @pytest.mark.parametrize("free", [0, 1, 3])

@@ -76,10 +76,12 @@ def _free_of_large(problem: Quadratic, most: int, top: float, solver: str | None
     start = np.random.default_rng(20061).standard_normal(problem.size)
     try:
         with factorise(shifted, solver=solver) as factor:
-            turned = LinearOperator(
-                shifted.shape, matvec=lambda x: factor.solve(problem.mass @ np.ravel(x)), dtype=float
-            )
-            values, vectors = eigs(turned, k=count, which="LM", v0=start)
+
+            def turned(x: Array) -> Array:
+                return factor.solve(problem.mass @ np.ravel(x))
+
+            operator = LinearOperator(shifted.shape, matvec=turned, dtype=float)
+            values, vectors = eigs(operator, k=count, which="LM", v0=start)
     except (AnalysisError, ArpackError):
         return None
     squares = np.abs(1.0 / values - shift)
