@@ -34,6 +34,33 @@ CASE = mode_coupling(0.02, 0.1)
         (lambda: st.cycles(CASE, 1.0, push=[0.1, 0.0]), "push: [0.1, 0.0] – finite speeds above or below 0 [m/s]"),
         (lambda: st.rank_countermeasures(CASE, mu=1.2, verify=-1), "verify: -1 – a whole number ≥ 0"),
         (lambda: st.rank_countermeasures(CASE, mu=1.2, chamfers=-1), "chamfers: -1 – a whole number ≥ 0"),
+        (
+            lambda: st.rank_countermeasures(CASE, mu=1.2, target="foo"),  # type: ignore[arg-type]
+            "target: 'foo' – the number of an unstable branch, or \"sum\" of all of them",
+        ),
+        (
+            lambda: st.rank_countermeasures(CASE, mu=0.1, target="foo"),  # type: ignore[arg-type]
+            "target: 'foo' – the number of an unstable branch, or \"sum\" of all of them",
+        ),
+        (lambda: st.rank_countermeasures(CASE, mu=1.2, watch="foo"), "watch: 'foo' – one of all, unstable"),  # type: ignore[arg-type]
+        (lambda: st.rank_countermeasures(CASE, mu=1.2, numbers=[1]), "numbers: [1] – a name, or a list of names"),  # type: ignore[list-item]
+        (lambda: st.modes(CASE, 0.5, vectors="left"), "vectors: 'left' – one of False, True, right"),  # type: ignore[arg-type]
+        (
+            lambda: st.ensemble(CASE, mu=0.5, initial="resting"),  # type: ignore[arg-type]
+            "initial: 'resting' – one of rest, steady-sliding, None",
+        ),
+        (
+            lambda: st.sensitivities(CASE, "mu", mu=1.2, modes=1),  # type: ignore[arg-type]
+            "modes: 1 – \"unstable\", \"all\" or a list of numbers of branches from 1 to 2",
+        ),
+        (lambda: st.sensitivities(CASE, 3.5, mu=1.2), "parameters: 3.5 – a name, or a list of names"),  # type: ignore[arg-type]
+        (
+            lambda: st.onsets(CASE, along=3.5),  # type: ignore[call-overload]
+            "along: 3.5 – the path of a number of the case, or a parameter of its matrices",
+        ),
+        (lambda: st.compare(CASE, [0.5], only="foo"), "only: 'foo' – of what is compared: growth, run, critical"),
+        (lambda: st.compare(CASE, [0.5], only=3.5), "only: 3.5 – a name, or a list of names"),  # type: ignore[arg-type]
+        (lambda: st.run(CASE, "never", only=3.5), "only: 3.5 – a name, or a list of names"),  # type: ignore[arg-type]
     ],
 )
 def test_what_is_none_is_refused_by_its_name(call: Callable[[], Any], said: str) -> None:

@@ -14,7 +14,7 @@ import scipy.linalg as sl
 import stridor as st
 from stridor.errors import AnalysisError
 from stridor.modal import checked_onsets
-from stridor.modal.between_ends import NOT_LOOKED
+from stridor.modal.between_ends import NOT_LOOKED, Between
 from stridor.modal.onset import Onsets
 from stridor.modal.onsets import onsets
 from stridor.modal.over_friction import onsets_of_band
@@ -116,7 +116,14 @@ def test_what_comes_and_goes_has_an_onset_with_where_it_enters_and_an_end():
     top = 2 * np.pi * band_hz
     for mu, roots in ((begins[0].enters_at - STEP, 0), (begins[0].enters_at + STEP, 2), (ends[0].mu + 1e-4, 0)):
         assert growing_roots(eigenvalues(system, rows, mu), top) == roots
-    assert "which lead to all that grows at 11 values between" in found.completeness
+    assert "As many roots grow at each of 11 further values as the onsets say." in found.completeness
+
+
+def test_what_is_said_of_it():
+    assert NOT_LOOKED.words == ""
+    assert Between(11).words == " As many roots grow at each of 11 further values as the onsets say."
+    said = " At 2 of 11 further values other numbers of roots grow than the onsets say, and branches lead to each of these."
+    assert Between(11, odd=2).words == said
 
 
 def left_by_the_end(seed: int) -> int:

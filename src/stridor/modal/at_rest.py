@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 
 from ..direct import SingularMatrix, factorise
 from ..errors import AnalysisError
@@ -50,12 +51,42 @@ def rest_limit(problems: Sequence[Quadratic], top: float, solver: str | None = N
     return found
 
 
-def more_slow(problem: Quadratic, slow: ComplexArray, top: float) -> bool:
-    """Whether of eigenvalues (k,) that may be zero there are more than motions without stiffness make, of matrices so
-    small that these are counted."""
-    if not len(slow) or problem.size > DENSE:
+def more_slow(problem: Quadratic, slow: ComplexArray, top: float, solver: str | None = None) -> bool:
+    """Whether of eigenvalues (k,) that may be zero there are more than motions without stiffness make; also where of
+    large matrices these cannot be counted."""
+    if not len(slow):
         return False
-    return double_zeros(slow) > _unresisted(problem, top, None).shape[1]
+    zeros = double_zeros(slow)
+    if problem.size <= DENSE:
+        return zeros > _unresisted(problem, top, None).shape[1]
+    free = _free_of_large(problem, zeros, top, solver)
+    return free is None or zeros > free
+
+
+def slow_words(limit: float) -> str:
+    """What is said of modes below ``limit`` [1/s] where `more_slow`."""
+    return f"modes below {limit / (2 * np.pi):.3g} Hz, which cannot be told from motions as a whole"
+
+
+def _free_of_large(problem: Quadratic, most: int, top: float, solver: str | None) -> int | None:
+    """How many motions, up to ``most``, the stiffness does not resist beyond rounding: among those of the least ν of
+    K x = ν M x, by Arnoldi's method. None where they are not found."""
+    shift, count = (AT_REST * top) ** 2, min(most, problem.size - 3)
+    shifted = sp.csr_array(problem.stiffness + shift * problem.mass)
+    start = np.random.default_rng(20061).standard_normal(problem.size)
+    try:
+        with factorise(shifted, solver=solver) as factor:
+
+            def turned(x: Array) -> Array:
+                return factor.solve(problem.mass @ np.ravel(x))
+
+            operator = LinearOperator(shifted.shape, matvec=turned, dtype=float)
+            values, vectors = eigs(operator, k=count, which="LM", v0=start)
+    except (AnalysisError, ArpackError):
+        return None
+    squares = np.abs(1.0 / values - shift)
+    rounding = [_rounding(problem, np.abs(vectors[:, k : k + 1])) ** 2 for k in range(count)]
+    return int(np.count_nonzero(squares <= np.maximum(rounding, LOST * shift)))
 
 
 def double_zeros(values: ComplexArray) -> int:

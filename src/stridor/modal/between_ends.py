@@ -29,10 +29,22 @@ MARGIN = 1.01  # times the highest frequency: every branch
 
 @dataclass(frozen=True)
 class Between:
-    """How many μ were looked at, and growing modes (k,) to which no branch leads by the μ at which they were found."""
+    """How many μ were looked at, at how many of them other numbers of roots grow than the onsets say, and growing modes
+    (k,) to which no branch leads by the μ at which they were found."""
 
     looked: int
     lacking: tuple[tuple[float, ComplexArray], ...] = ()
+    odd: int = 0
+
+    @property
+    def words(self) -> str:
+        """A sentence where branches lead to all that was found, "" where nothing was looked at."""
+        if not self.looked:
+            return ""
+        if not self.odd:
+            return f" As many roots grow at each of {self.looked} further values as the onsets say."
+        where = f"At {self.odd} of {self.looked} further values" if self.odd < self.looked else "At all further values"
+        return f" {where} other numbers of roots grow than the onsets say, and branches lead to each of these."
 
 
 NOT_LOOKED = Between(0)
@@ -65,7 +77,7 @@ def between_ends(
     except AnalysisError:
         return NOT_LOOKED
     lacking = ((g.mu, _unled(g, modes.eigenvalues[row], modes.unstable[row])) for row, g in enumerate(odd))
-    return Between(len(inner), tuple((mu, values) for mu, values in lacking if len(values)))
+    return Between(len(inner), tuple((mu, values) for mu, values in lacking if len(values)), len(odd))
 
 
 def every_branch(system: System, found: Onsets, *, damped: bool, options: Options) -> float | None:

@@ -151,11 +151,10 @@ def _sentence(found: Onsets, start: Growing, end: Growing, between: Between) -> 
     if not (start.complete and end.complete):
         sentence = start.sentence if not start.complete else end.sentence
         return f"{NOT_COMPLETE}: {numbers}, as the onsets say, but {sentence}"
-    looked = f", which lead to all that grows at {between.looked} values between" if between.looked else ""
     return (
         f"{CHECKED} {'both ends' if start.sought else 'the high end'}: {numbers}, and each of them goes back to an "
         f"onset listed or grew from the start.{_left_words(found, start, end)}{_parted_words(found, start, end)} "
-        f"{end.sentence} What grows and ends again between them rests on the branches followed{looked}."
+        f"{end.sentence} What grows and ends again between them rests on the branches followed.{between.words}"
     )
 
 
@@ -165,7 +164,8 @@ def _unled_words(values: ComplexArray, mu: float) -> str:
 
 
 def _left_words(found: Onsets, start: Growing, end: Growing) -> str:
-    """A sentence on modes that begin to grow at an onset listed and have left the band upwards by the high end."""
+    """Sentences on modes that begin to grow at an onset listed and by the high end have left the band upwards, or are
+    too slow to be sought there."""
     if found.followed is None:
         return ""
     limit, (numbers, values) = found.max_frequency_hz, found.followed[1]
@@ -173,7 +173,9 @@ def _left_words(found: Onsets, start: Growing, end: Growing) -> str:
     last = {b: o for o in found.onsets for b in o.branches}
     on = sum(b in last and not last[b].stabilising for b in numbers[beyond].tolist())
     said = sum(o.roots for o in found.onsets) + 2 * len(found.entering)
-    ended = max((said - growing_roots(end.values) + growing_roots(start.values)) // 2 - on, 0)
+    slow, before = (_slow(f[1], g) for f, g in zip(reversed(found.followed), (end, start), strict=True))
+    unsought = growing_roots(slow) - growing_roots(before)
+    ended = max((said - growing_roots(end.values) + growing_roots(start.values) - unsought) // 2 - on, 0)
     told: list[str] = []
     if on:
         verb, they = ("has", "it grows") if on == 1 else ("have", "they grow")
@@ -181,7 +183,17 @@ def _left_words(found: Onsets, start: Growing, end: Growing) -> str:
         told.append(f"{on} {verb} left the band upwards by then: at μ = {high:g} {they} on above {hertz(limit)}")
     if ended:
         told.append(f"{ended} {'has' if ended == 1 else 'have'} left the band upwards and ceased to grow beyond it")
-    return f" Of the growing modes {', and '.join(told)}." if told else ""
+    left = f" Of the growing modes {', and '.join(told)}." if told else ""
+    if not len(slow):
+        return left
+    below = f"below {end.still / (2 * np.pi):.3g} Hz, where none was sought beside motions as a whole"
+    counted = "1 branch grows" if len(slow) == 1 else f"{len(slow)} branches grow"
+    return f"{left} At μ = {found.friction_range[1]:g}, {counted} {below}."
+
+
+def _slow(values: ComplexArray, sought: Growing) -> ComplexArray:
+    """Growing branches (k,) so slow that they were not sought."""
+    return values[grows(values, 0.0) & (np.abs(values) <= sought.still)]
 
 
 def _roots_amiss(found: Onsets, start: Growing, end: Growing) -> list[str]:

@@ -9,6 +9,8 @@ compliance εA₀ in the contacts λ² → −(1 + μφ)/ε for each eigenvalue 
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
@@ -17,14 +19,16 @@ from scipy.sparse.csgraph import connected_components
 from ..direct import factorise
 from ..direct.factor import BLOCK
 from ..errors import AnalysisError
+from ..sliding import full_motion
 from ..system import System
 from ..typing import Array, IntArray, Sparse
-from .krylov.steady import contact_rows, touching_nodes
+from .krylov.steady import TouchingNodes, contact_rows, touching_nodes
 from .options import Options
 
 REAL = 1e-7  # of |φ|: an imaginary part that two equal ones may get by rounding
 SEEN = 1e-12  # of the largest: what of A₀, scaled to a unit diagonal, tells contacts apart
 REACHED = 1e-12  # of μ
+SAME = 1e-12  # of the largest friction coefficient
 
 
 def refuse_undetermined(system: System, high: float, options: Options, *, touching_at: float | None = None) -> None:
@@ -37,10 +41,10 @@ def refuse_undetermined(system: System, high: float, options: Options, *, touchi
         raise AnalysisError(undetermined(limit))
 
 
-def undetermined(mu: float) -> str:
-    """What is said of an eigenvalue that runs to infinity."""
+def undetermined(mu: float, where: str = "") -> str:
+    """What is said of an eigenvalue that runs to infinity; where: what else has which value, " (at damping = 3)"."""
     return (
-        f"an eigenvalue grows beyond all bounds at μ = {mu:.9g}: from there on rigid contact "
+        f"an eigenvalue grows beyond all bounds at μ = {mu:.9g}{where}: from there on rigid contact "
         "with friction no longer determines the motion (Painlevé's paradox); stay below, or give the "
         "contact a stiffness"
     )
@@ -52,30 +56,72 @@ def undetermined_from(system: System, options: Options, *, touching_at: float | 
     Infinite as well where it cannot be judged by the masses: rigid contacts that act on freedoms without one, that are
     given twice, that are closed nowhere or do not slide, and masses without an inverse.
     """
+    asked = ("undetermined from", touching_at if system.touching_at is None else system.touching_at, options.solver)
+    return _judged(system, options, touching_at, asked)
+
+
+def steps_undetermined(system: System, mu: float | None, options: Options) -> str:
+    """What is to be said of a run in time with rigid contact that does not determine steady sliding at ``mu`` (None:
+    the laws' own friction), "" of others."""
+    nodes = system.contact_nodes()
+    own = nodes.friction_coefficients(np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1))
+    rubs = own[nodes.share > 0.0]
+    if mu is None and len(rubs) and np.ptp(rubs) <= SAME * rubs.max():
+        mu = float(rubs[0])
+    if mu is not None:
+        limit, reached = undetermined_from(system, options, touching_at=mu), mu
+        said = f"from μ = {limit:.6g} on, and it has μ = {mu:.6g} here"
+    else:
+        # Each contact has its own: by which factor of all of them.
+        limit, reached = _judged(system, options, None, ("undetermined by own friction", options.solver), own), 1.0
+        said = f"from {limit:.6g} times the friction of the case on"
+    if limit > reached * (1 + REACHED):
+        return ""
+    return (
+        f"rigid contact with friction does not determine the motion (Painlevé's paradox) {said}: where no forces keep "
+        "contacts sliding, an impulse of a single step stops them, and its force grows as the step gets smaller; give "
+        "the contact a stiffness, or stay below"
+    )
+
+
+def _judged(
+    system: System, options: Options, touching_at: float | None, asked: tuple[Hashable, ...],
+    friction: Array | None = None,
+) -> float:  # fmt: skip
+    """The least factor of ``friction`` (m,) of all nodes (None: 1) at which A is singular; ``asked`` once."""
     nodes = system.contact_nodes()
     if not nodes.count or not np.any(nodes.compliance == 0.0):
         return np.inf
-    asked = ("undetermined from", touching_at if system.touching_at is None else system.touching_at, options.solver)
-    return system.once(asked, lambda: _undetermined_from(system, options, touching_at))
+
+    def found() -> float:
+        try:
+            touching = touching_nodes(system, nodes, touching_at, options.solver)
+        except AnalysisError:
+            return np.inf  # whoever solves there says so
+        # Over a range of μ mostly the same nodes touch.
+        same = (asked[0], touching.active.tobytes(), touching.sense.tobytes(), touching.stuck.tobytes(), options.solver)
+        return system.once(same, lambda: _of_touching(system, touching, friction, options.solver))
+
+    return system.once(asked, found)
 
 
-def _undetermined_from(system: System, options: Options, touching_at: float | None) -> float:
-    nodes = system.contact_nodes()
-    try:
-        touching = touching_nodes(system, nodes, touching_at, options.solver)
-    except AnalysisError:
-        return np.inf  # whoever solves there says so
-    rows = contact_rows(nodes, np.flatnonzero(touching.active), touching.sense, touching.stuck)
-    rigid = rows.compliance == 0.0
-    # A node that no freedom moves along its normal can neither press nor give way.
-    rigid &= abs(rows.normal).sum(axis=1) > 0
-    return singular_from(system.mass, rows.normal[rigid], rows.slide[rigid], options.solver)
+def _of_touching(system: System, touching: TouchingNodes, friction: Array | None, solver: str | None) -> float:
+    nodes, chosen = system.contact_nodes(), np.flatnonzero(touching.active)
+    rows = contact_rows(nodes, chosen, touching.sense, touching.stuck)
+    slide = rows.slide
+    if friction is not None:
+        held = np.zeros(rows.normal.shape[0] - len(chosen))
+        slide = sp.csr_array(sp.diags_array(np.concatenate([friction[chosen], held])) @ rows.slip)
+    rigid = np.flatnonzero(rows.compliance == 0.0)
+    return singular_from(system.mass, rows.normal[rigid], slide[rigid], solver)
 
 
 def singular_from(mass: Sparse, normal: Sparse, slide: Sparse, solver: str | None = None) -> float:
     """The least μ > 0 at which N M⁻¹ (N + μS)ᵀ is singular, N and S (m, n); infinite where there is none, or where it
     cannot be judged."""
-    reached = _reached(mass, normal, slide)
+    # A node that no freedom moves along its normal can neither press nor give way.
+    presses = np.flatnonzero(abs(normal).sum(axis=1) > 0)
+    reached = _reached(mass, normal[presses], slide[presses])
     if reached is None:
         return np.inf
     seen = _accelerations(*reached, solver)

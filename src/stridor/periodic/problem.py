@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..errors import AnalysisError, CaseError
+from ..modal.options import Options
+from ..modal.painleve import refuse_undetermined
 from ..sliding import full_motion, slip_speeds, steady_nodes
 from ..system import System
 from ..temporal.steppers.basis import Basis
@@ -78,7 +80,7 @@ class Family:
 
     def at(self, mu: float) -> SlidingProblem:
         """The problem at a friction coefficient; the last few are kept. Raises AnalysisError where nothing slides
-        steadily there."""
+        steadily there, and where rigid contact does not determine how."""
         if mu not in self._made:
             while len(self._made) > 3:
                 self._made.pop(next(iter(self._made)))
@@ -89,6 +91,7 @@ class Family:
         system, basis = self.system, self.basis
         if not mu >= 0.0:
             raise AnalysisError(f"μ = {mu:g} is no friction coefficient")
+        refuse_undetermined(system, mu, Options(), touching_at=mu)
         scaled = frictional(system, mu)
         pairs = pairs_of(scaled, basis)
         motion = system.motion

@@ -23,6 +23,7 @@ from ..modal.full import ParametricOnsets, full_modes, full_onsets
 from ..modal.onsets import Onsets
 from ..modal.onsets import onsets as solve_onsets
 from ..modal.over_friction import modes_of_band, onsets_of_band
+from ..modal.painleve import steps_undetermined
 from ..modal.receptance_modes import prepare
 from ..modal.source import by_receptance, require_full
 from ..sliding import taken_as_closed
@@ -35,7 +36,7 @@ from ..temporal.simulate import simulate as march
 from ..temporal.trajectory import Trajectory
 from ..typing import Array
 from .along import onsets_along
-from .asked import require_band, require_count, require_frequency, require_friction, require_range
+from .asked import require_band, require_choice, require_count, require_frequency, require_friction, require_range
 from .body_modes import BodyModes, body_modes
 from .description import Description, describe
 from .fingerprint import check_restart, fingerprint
@@ -93,6 +94,7 @@ def modes(
     require_frequency(max_frequency_hz)
     if count is not None:
         require_count(count, "count")
+    require_choice(vectors, "vectors", (False, True, "right"))
     work = Workspace.of(problem)
     values, system = (_own(work) if mu is None else (mu, None))
     damped = work.modal.damped if damped is None else damped
@@ -252,6 +254,8 @@ def onsets(
     that is none.
     """
     if along is not None:
+        if not isinstance(along, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise CaseError("along", along, "the path of a number of the case, or a parameter of its matrices")
         case = Workspace.of(problem).case("along")
         if along != MU or MU in case.parameters:
             return onsets_along(case, along, friction_range, max_frequency_hz=max_frequency_hz)
@@ -325,9 +329,10 @@ def simulate(
     if work.given is not None:
         marks["fingerprint"] = fingerprint(work.given, mu)
     system, phases, settings = work.structured("simulate", mu), phases_of(work), settings_of(work)
-    if notes := [*(() if mu is None else work.one_for_all), *system.tie_words]:
-        marks["notes"] = notes
     require_pressed_in_time(work, system, "simulate")
+    beyond = steps_undetermined(settings.system(system), mu, work.options)
+    if notes := [*(() if mu is None else work.one_for_all), *system.tie_words, *([beyond] if beyond else [])]:
+        marks["notes"] = notes
     check_extent(work, system)
 
     def told(run: Trajectory) -> Trajectory:
@@ -351,6 +356,8 @@ def simulate(
         part = getattr(error, "trajectory", None)
         if part is not None:
             error.trajectory = told(part)  # type: ignore[attr-defined]
+        if beyond:
+            error.args = (f"{error}; {beyond}",)
         raise
     return told(result)
 

@@ -50,6 +50,21 @@ def require_count(value: Any, where: str, least: int = 1, more: str = "") -> Non
         raise CaseError(where, value, f"a whole number ≥ {least}{more}")
 
 
-def names_of(given: str | Iterable[str]) -> tuple[str, ...]:
-    """Names as a list of them; one may stand by itself."""
-    return (given,) if isinstance(given, str) else tuple(given)
+def require_choice(given: Any, where: str, accepted: Iterable[str | bool | None]) -> None:
+    """Refuse what is none of a few words, or of True, False and None among them. Raises CaseError."""
+    words = tuple(accepted)
+    if not any(given is word or (isinstance(given, str) and given == word) for word in words):
+        raise CaseError(where, given, f"one of {', '.join(str(word) for word in words)}")
+
+
+def names_of(given: str | Iterable[str], where: str) -> tuple[str, ...]:
+    """Names as a list of them; one may stand by itself. Raises CaseError for anything else."""
+    if isinstance(given, str):
+        return (given,)
+    try:
+        names: tuple[Any, ...] = tuple(given)
+    except TypeError:
+        names = (None,)
+    if not all(isinstance(name, str) for name in names):
+        raise CaseError(where, given, "a name, or a list of names")
+    return names

@@ -13,6 +13,7 @@ from ..errors import CaseError, StridorError
 from ..periodic import Cycle, CycleOnset
 from ..temporal.trajectory import Trajectory
 from . import analyses
+from .asked import names_of
 from .cycles import cycles as find_cycles
 from .settings import phases_of, settings_of
 from .workspace import Problem, Workspace
@@ -38,7 +39,8 @@ def compare(
     parts are put and sought (`io.kept_parts`); finished is called with each μ when it is done. Ctrl-C returns what is
     finished. Raises CaseError for cycles without "run".
     """
-    if cycles and only is not None and len(only) and "run" not in only:
+    only = None if only is None else names_of(only, "only")
+    if cycles and only and "run" not in only:
         raise CaseError("only", ", ".join(only), "with run among it: cycles are held against full runs")
     work = Workspace.of(problem)
     found = analyses.compare(

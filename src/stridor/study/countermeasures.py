@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import Literal
+from operator import index
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from ..errors import AnalysisError, CaseError
 from ..modal.krylov.steady import refuse_stick
 from ..notebook import counted
 from ..system.imported import ImportedTerm, load_terms
-from .asked import names_of, require_count, require_frequency
+from .asked import names_of, require_choice, require_count, require_frequency
 from .measure_ranking import Ranking
 from .measure_verification import verified
 from .measures import Countermeasures, Measure, Target, Verified
@@ -24,6 +25,8 @@ from .sensitivities import Linearised
 from .workspace import Problem, Workspace
 
 WHOLE = 0.5  # of all freedoms: a matrix that reaches over more is that of the whole model
+
+Watch = Literal["all", "unstable"]
 
 __all__ = ["Countermeasures", "Measure", "Verified", "rank_countermeasures"]
 
@@ -42,7 +45,7 @@ def rank_countermeasures(
     count: int | None = None,
     max_frequency_hz: float | None = None,
     damped: bool | None = None,
-    watch: Literal["all", "unstable"] = "all",
+    watch: Watch = "all",
 ) -> Countermeasures:
     """Rank changes of a case by the growth rate that they take away per per cent of change.
 
@@ -65,6 +68,8 @@ def rank_countermeasures(
     require_count(verify, "verify", least=0)
     require_count(chamfers, "chamfers", least=0)
     require_frequency(max_frequency_hz)
+    require_choice(watch, "watch", get_args(Watch))
+    target = _target(target)
     work = Workspace.of(problem)
     case = work.case("the ranking of countermeasures")
     refuse_stick(work.system(mu), "the ranking of countermeasures")
@@ -75,7 +80,6 @@ def rank_countermeasures(
         empty = np.zeros(0)
         source = provenance(work, "countermeasures", time.perf_counter() - started, mu=linear.mu)
         return Countermeasures(linear.mu, target, empty.astype(np.int64), empty + 0j, (), margin, told, source)
-    target = target if target == "sum" else int(target)
     if target != "sum" and target not in linear.modes.branch[unstable]:
         branches = ", ".join(str(b) for b in linear.modes.branch[unstable])
         raise CaseError("target", target, f"not an unstable branch, {branches}; without one all of these together")
@@ -88,7 +92,7 @@ def rank_countermeasures(
         columns = linear.modes.branch[ranking.columns]
         return Countermeasures(linear.mu, target, columns, ranking.eigenvalues, (), margin, told, source)
     left = whole_matrices(case, linear.mu) if numbers is None else []
-    found = ranking.numbers(default_numbers(case, left) if numbers is None else names_of(numbers))
+    found = ranking.numbers(default_numbers(case, left) if numbers is None else names_of(numbers, "numbers"))
     if added_mass:
         found += ranking.masses()
     if chamfers > 0:
@@ -119,6 +123,19 @@ def rank_countermeasures(
         (*linear.warnings, *told),
         provenance(work, "countermeasures", time.perf_counter() - started, mu=linear.mu),
     )
+
+
+def _target(given: Any) -> Target:
+    """The number of a branch, in digits as well, or "sum". Raises CaseError for anything else."""
+    if isinstance(given, str) and given == "sum":
+        return "sum"
+    try:
+        number = int(given) if isinstance(given, str) else index(given)
+    except (TypeError, ValueError):
+        number = 0
+    if number < 1 or isinstance(given, bool):
+        raise CaseError("target", given, 'the number of an unstable branch, or "sum" of all of them')
+    return number
 
 
 def _taken(measure: Measure) -> float:

@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..errors import CaseError
+from ..modal.painleve import steps_undetermined
 from ..sliding import full_motion
 from ..system import System
 from ..temporal.ensembles import EnsembleOutcome, march_all
@@ -20,7 +21,7 @@ from ..temporal.simulate import Progress, step_of
 from ..temporal.trajectory import Trajectory
 from ..typing import Array, IntArray
 from .analyses import check_extent
-from .asked import require_count
+from .asked import require_choice, require_count
 from .ensemble_modes import UnstableMap, unstable_modes
 from .ensemble_numbers import LEAST_RECORDS, MemberNumbers, Observable, last_phase, numbers_of, observable_of
 from .ensemble_result import AXES, Ensemble
@@ -72,6 +73,7 @@ def ensemble(
     cannot be had, and what `simulate` raises for all members.
     """
     started = time.perf_counter()
+    require_choice(initial, "initial", ("rest", "steady-sliding", None))
     if cores is not None:
         require_count(cores, "cores", more=", or None for all")
     work = Workspace.of(problem)
@@ -95,7 +97,10 @@ def ensemble(
     )  # fmt: skip
     found = _modes(work, plan) if modes else UnstableMap(None, (), ())
     made = provenance(work, "ensemble", time.perf_counter() - started, **_asked(values, grid, sweep, swept, window))
-    return _result(work, system, plan, seen, outcome, found, window, made)
+    result = _result(work, system, plan, seen, outcome, found, window, made)
+    highest = None if np.isnan(plan.rows[:, 0]).all() else float(np.nanmax(plan.rows[:, 0]))
+    beyond = steps_undetermined(settings.system(system), highest, work.options)
+    return replace(result, notes=(*result.notes, beyond)) if beyond else result
 
 
 def _check_window(work: Workspace, system: System, settings: Settings, window: float) -> None:

@@ -63,7 +63,7 @@ def observable_of(name: str | None, system: System, settings: Settings) -> Obser
 
 def named_observable(name: str, points: Sequence[str], contacts: Sequence[str], directions: str) -> Observable:
     """The observable of a name among these points and contacts. Raises CaseError for another."""
-    owner, _, what = name.rpartition(".")
+    owner, _, what = str(name).rpartition(".")
     quantity, _, direction = what.partition("_") if what.split("_")[0] in OF_POINT else (what, "", "")
     if quantity in OF_POINT and owner in points and direction in ("", *directions):
         return Observable(name, owner, quantity, direction, OF_POINT[quantity])

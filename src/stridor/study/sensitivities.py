@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -84,7 +84,7 @@ def sensitivities(
     and for "mu" where nothing depends on it, AnalysisError where steady sliding does not exist. A mode without
     derivatives is left out, and a warning says so.
     """
-    started, parameters = time.perf_counter(), names_of(parameters)
+    started, parameters = time.perf_counter(), names_of(parameters, "parameters")
     work = Workspace.of(problem)
     linear = Linearised.of(work, mu, count=count, max_frequency_hz=max_frequency_hz, damped=damped)
     values = np.array([linear.value(path) for path in parameters])
@@ -341,12 +341,15 @@ class Linearised:
         if choice == "all":
             return list(range(len(self.eigenvalues)))
         where = {int(number): column for column, number in enumerate(self.modes.branch)}
-        missing = [number for number in choice if number not in where]
-        if missing or isinstance(choice, str):
+        given: Any = choice
+        listed = isinstance(given, Iterable) and not isinstance(given, str)
+        missing = [number for number in choice if number not in where] if listed else [given]
+        if missing:
             numbers = f"from 1 to {len(where)}" if where else "(the band has none)"
-            words = '"unstable", "all" or ' if isinstance(choice, str) else ""
-            accepted = f"{words}numbers of branches {numbers}"
-            raise CaseError("modes", missing or choice, accepted)
+            accepted = f"a list of numbers of branches {numbers}"
+            if not listed:
+                raise CaseError("modes", given, f'"unstable", "all" or {accepted}')
+            raise CaseError("modes", missing, accepted)
         return [where[number] for number in choice]
 
     def gap(self, column: int) -> float:

@@ -103,7 +103,7 @@ def _records(run: Trajectory, phase: str | None) -> slice:
     if phase is None:
         return run.phase_slice() if names else slice(None)
     if phase not in names:
-        raise CaseError("phase", phase, f"a phase of the run{choice(phase, names, 'there are')}")
+        raise CaseError("phase", phase, f"a phase of the run{choice(str(phase), names, 'there are')}")
     return run.phase_slice(names.index(phase))
 
 

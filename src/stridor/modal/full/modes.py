@@ -21,6 +21,7 @@ import numpy as np
 from ...errors import CaseError
 from ...system import System
 from ...typing import Array, ComplexArray
+from ..at_rest import more_slow, moving, slow_words
 from ..options import Options
 from ..painleve import refuse_undetermined
 from ..quadratic import band_modes, is_stiff
@@ -122,6 +123,9 @@ def _modes(family: SystemFamily, mu: float, top: float, *, left: bool) -> ModesA
     )  # fmt: skip
     n = family.freedoms
     told = spectrum.completeness.sentence
+    slow = spectrum.values[~moving(spectrum.values, top, lambda: family.rest_limit(top))]
+    if more_slow(family.built(mu), slow, top, family.options.solver):
+        told = f"NOT COMPLETE: there are {slow_words(family.rest_limit(top))}. Of faster ones: {told}"
     return ModesAtFriction(
         without_rounding(family, spectrum.values, top),
         unit(spectrum.right[:n]),

@@ -92,7 +92,7 @@ def search(
     answer = _searched(family, make, between, ends, top, why)
     for mu, end in zip(between, ends, strict=True):
         slow = end.values[~moving(end.values, top, lambda: family.rest_limit(top))]
-        if more_slow(family.built(mu), slow, top):
+        if more_slow(family.built(mu), slow, top, family.options.solver):
             return replace(answer, slow=family.rest_limit(top))
     return answer
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..at_rest import slow_words
 from ..quadratic import RegionModes
 from .basis import Projected
 from .branches import all_values
@@ -29,8 +30,7 @@ def sentence(
     are not listed, so that nothing listed is complete."""
     if answer.slow:
         faster = sentence(family, replace(answer, slow=0.0), ends, top, name, value, where, left_out)
-        slow = f"modes below {answer.slow / (2 * np.pi):.3g} Hz, which cannot be told from motions as a whole"
-        return f"Not complete: there are {slow}. Of faster ones: {faster}"
+        return f"Not complete: there are {slow_words(answer.slow)}. Of faster ones: {faster}"
     first, last = (int(np.count_nonzero(unstable(family, end.values, top))) for end in ends)
     low, high = (f"{value(mu):g}" for mu in _between(family, answer))
     numbers = f"{_modes(first)} at {name} = {low} and {last} at {name} = {high}"

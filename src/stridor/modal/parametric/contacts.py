@@ -23,6 +23,7 @@ from ...system import System
 from ...typing import BoolArray, Sparse
 from ..krylov.steady import contact_rows, refuse_stick, steadiness, touching_nodes
 from ..options import Options
+from .contacts_determined import refuse_undetermined_in
 from .contacts_rigid import Elimination, eliminate
 from .contacts_sampling import Values
 from .contacts_steady import FRICTION, STIFFNESS, Contacts, contacts_of, steady_terms
@@ -135,13 +136,17 @@ def contacts_problem(
     def pieces_at(values: Values) -> Mapping[str, FactoredPart]:
         return {**family.structure_at(values), **_springs(contacts_at(values), varied=FRICTION in names)}
 
-    elimination = _elimination(family, contacts_at, rigid) if rigid.any() else None
+    rows = _rigid_rows(family, contacts_at, rigid) if rigid.any() else None
     terms = interpolated_terms(pieces_at, family.interpolated)
     notes: tuple[str, ...] = ()
     if not effects.neutral:
         more, notes = steady_terms(family.system_at, family.parameters, touching, effects)
         terms = (*terms, *more)
-    if elimination is not None:
+    elimination = None
+    if rows is not None:
+        normal, slide, friction, own = rows
+        elimination = eliminate(normal, slide, 1.0 if friction is None else friction)
+        refuse_undetermined_in(terms, family.parameters, (normal, slide), friction, own, options.solver)
         terms = elimination.applied(terms)
     return ContactsProblem(terms, family.parameters, elimination, notes, notes, steady.active)
 
@@ -169,8 +174,12 @@ def _own_slide(contacts: Contacts) -> Sparse:
     return sp.csr_array(sp.diags_array(contacts.coefficient[contacts.touching]) @ contacts.slide)
 
 
-def _elimination(family: ParametricSystems, contacts_at: Callable[[Values], Contacts], rigid: BoolArray) -> Elimination:
-    """Rigid contact taken out, the same for all values of the parameters. Raises CaseError where it is not the same."""
+def _rigid_rows(
+    family: ParametricSystems, contacts_at: Callable[[Values], Contacts], rigid: BoolArray
+) -> tuple[Sparse, Sparse, Parameter | None, float | None]:
+    """Rows of gap and slip (m, n) of rigid contacts, the same for all values of the parameters, and the friction
+    coefficient as a parameter; where it is none each contact's own is in its slip, and the last is that of all, None
+    where they differ. Raises CaseError where rows are not the same."""
     reference = {p.name: p.value for p in family.interpolated}
     own = contacts_at(reference)
     friction = next((p for p in family.parameters if p.name == FRICTION), None)
@@ -181,14 +190,24 @@ def _elimination(family: ParametricSystems, contacts_at: Callable[[Values], Cont
             for one, two in ((own.normal, other.normal), (own.slide, other.slide)):
                 same = same and deviation(one[rigid], two[rigid]) <= SAME
             if not same:
-                accepted = "moves where rigid contact touches, or the direction of its slip; give numbers that do not"
+                accepted = (
+                    "moves where rigid contact touches, or the direction of its slip; give numbers that do not, or "
+                    "give the contact a stiffness"
+                )
                 raise CaseError(f"box.{p.name}", value, accepted)
             if friction is None and deviation(_own_slide(own)[rigid], _own_slide(other)[rigid]) > SAME:
-                accepted = "friction of rigid contact is varied for all contacts together, by mu"
+                accepted = (
+                    "friction of rigid contact is varied for all contacts together, by mu; take mu, or give the "
+                    "contact a stiffness"
+                )
                 raise CaseError(f"box.{p.name}", value, accepted)
-    if friction is None:
-        return eliminate(own.normal[rigid], _own_slide(own)[rigid], 1.0)
-    return eliminate(own.normal[rigid], own.slide[rigid], friction)
+    if friction is not None:
+        return own.normal[rigid], own.slide[rigid], friction, None
+    # Of rigid contacts that friction works on.
+    rubs = own.coefficient[own.touching][rigid]
+    rubs = rubs[rubs > 0.0]
+    alike = float(rubs[0]) if len(rubs) and np.ptp(rubs) <= 1e-12 * rubs.max() else None
+    return own.normal[rigid], _own_slide(own)[rigid], None, alike
 
 
 def contact_parameters(

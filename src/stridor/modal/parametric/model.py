@@ -24,7 +24,7 @@ from ...notebook import Shown, counted, html_table
 from ...tabular import MODE, Rows, Tabular, mode_cells
 from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
-from ..at_rest import more_slow, moving, rest_limit, told_growth
+from ..at_rest import more_slow, moving, rest_limit, slow_words, told_growth
 from ..dense_problem import combined
 from ..quadratic.problem import Quadratic
 from ..quadratic.reach import searched_in
@@ -155,8 +155,7 @@ class ReducedModel(Shown):
         if not more_slow(self._small(modes.point), slow, self.searched):
             return ""
         return (
-            f"there are modes below {modes.still / (2 * np.pi):.3g} Hz, which cannot be told from motions as a whole: "
-            "whether they grow is not said"
+            f"there are {slow_words(modes.still)}: whether they grow is not said"
         )
 
     def hidden_at(self, points: Sequence[Mapping[str, float]]) -> tuple[str, ...]:

@@ -10,6 +10,8 @@ import scipy.sparse as sp
 
 from ...errors import AnalysisError, CaseError
 from ...laws.friction import FrictionLaw, friction_rows
+from ...modal.options import Options
+from ...modal.painleve import refuse_undetermined
 from ...sliding import full_motion, steady_nodes
 from ...system import System
 from ...typing import Array, IntArray
@@ -116,12 +118,14 @@ class HarmonicFamily:
         return np.where(np.isinf(stiffness), local, stiffness)
 
     def steady(self, mu: float) -> SteadyContact:
-        """Steady sliding. Raises AnalysisError where there is none."""
+        """Steady sliding. Raises AnalysisError where there is none, and where rigid contact does not determine it."""
         if not mu >= 0.0:
             raise AnalysisError(f"μ = {mu:g} is no friction coefficient")
         if mu not in self._steady:
             while len(self._steady) > 8:
                 self._steady.pop(next(iter(self._steady)))
+            if not self.own:
+                refuse_undetermined(self.system, mu, Options(), touching_at=mu)
             found = steady_nodes(self.system, mu)
             self._steady[mu] = SteadyContact(mu, found.normal_force, found.friction_force, found.gap)
         return self._steady[mu]
