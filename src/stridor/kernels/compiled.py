@@ -26,8 +26,9 @@ def njit(
     """Compile a function at its first call, with the options of numba's ``njit``; ``cache`` keeps the machine code.
 
     allocates: False for one that makes no arrays, but for views of others: it then counts no references, whose code
-    takes a seventh of the time to compile. Used as ``@njit``, ``@njit(cache=True, …)`` or ``njit(cache=True)(function)``. Where no folder can be written the
-    function is compiled by every process that calls it.
+    takes a seventh of the time to compile. Used as ``@njit``, ``@njit(cache=True, …)`` or
+    ``njit(cache=True)(function)``. Where no folder can be written the function is compiled by every process that calls
+    it.
     """
 
     def made(plain: Callable[..., Any]) -> Any:
