@@ -221,9 +221,11 @@ def test_multipliers_count_only_where_the_motions_own_is_one(slow_belt: Cycles):
 def test_seconds_end_a_branch():
     """And that is said as what is missing, over a range and at a μ."""
     problem = mode_coupling(DAMPED, 0.1)
-    over = st.cycles(problem, between=(0.1, 1.8), method="harmonic", harmonics=5, seconds=1e-9)
+    over = st.cycles(problem, between=(0.1, 1.8), method="harmonic", harmonics=5, seconds=1e-9, runs=0)
     assert len(over.cycles) == 1
     assert over.missing == (f"branch 1: its 1e-09 s of computing were over at μ = {over.cycles[0].mu:.6g}",)
+    assert "no stable cycle was found between μ = 0.751899 and 1.8" in over.notes[-1]
+    assert over.notes[-1].endswith("no run in time was made there")
     at = st.cycles(problem, 1.0, method="harmonic", harmonics=5, seconds=1e-9)
     assert not at.cycles
     assert "it does not pass there; its 1e-09 s of computing were over" in at.missing[0]
