@@ -128,6 +128,7 @@ class Tracer:
                 heading = None
             if sense < 0.0:
                 traced.add(closed, said, fold=False)
+                self.kept()
             if heading is not None:
                 self._follow(
                     branch, traced, closed, heading, "along its branch", include=False, others=others, joins=joins

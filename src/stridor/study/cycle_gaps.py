@@ -92,17 +92,33 @@ class Gaps:
         return max(wide)[1:] if wide else None
 
     def words(self, branches: Sequence[Traced]) -> list[str]:
-        """Of each interval that is left."""
-        return [self._words(low, high, branches) for low, high in self.left(branches)]
+        """Of the intervals that are left; of those without a run in one sentence."""
+        said: dict[str, list[str]] = {}
+        for low, high in self.left(branches):
+            said.setdefault(self._told(low, high, branches), []).append(f"{low:.6g} and {high:.6g}")
+        return [
+            f"no stable cycle was found between μ = {', '.join(where)}, where steady sliding is unstable: {told}"
+            for told, where in said.items()
+        ]
 
-    def _words(self, low: float, high: float, branches: Sequence[Traced]) -> str:
+    def trusted(self, branches: Sequence[Traced]) -> list[str]:
+        """Of each branch that counts as stable only as a run stays in it: where that is."""
+        lost, said = [mu for mu, ended in self.runs if ended == "lost"], list[str]()
+        for number, branch in enumerate((b for b in branches if b.cycles), start=1):
+            for low, high in covered(branch, lost):
+                stays = [f"{mu:.6g}" for mu, _, _ in branch.stays if low <= mu <= high]
+                if stays and any(c.stable is None and low <= c.mu <= high for c in branch.cycles):
+                    said.append(
+                        f"branch {number}: between μ = {low:.6g} and {high:.6g} it is not known of all its cycles "
+                        f"whether they are stable; a run in time settles in it at μ = {', '.join(stays)}"
+                    )
+        return said
+
+    def _told(self, low: float, high: float, branches: Sequence[Traced]) -> str:
         met = sorted((mu, ended) for mu, ended in self.runs if low < mu < high)
         lost, late = (", ".join(f"{mu:.6g}" for mu, ended in met if ended == how) for how in ("lost", "late"))
         told = [f"runs in time at μ = {lost} led to none"] if lost else []
         told += [f"the time of the run at μ = {late} was over"] if late else []
         between = [c for b in branches for c in b.cycles if c.stable is None and low < c.mu < high]
         rest = "; there are cycles of which it is not known whether they are stable" if between else ""
-        return (
-            f"no stable cycle was found between μ = {low:.6g} and {high:.6g}, where steady sliding is unstable: "
-            f"{'; '.join(told) or 'no run in time was made there'}{rest}"
-        )
+        return f"{'; '.join(told) or 'no run in time was made there'}{rest}"

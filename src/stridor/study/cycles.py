@@ -220,6 +220,7 @@ class _CycleSearch:
                 self.missing.append(f"μ = {mu:.6g}: {error}")
                 ended = "lost"
             gaps.runs.append((mu, ended))
+        self.notes += gaps.trusted(traced)
         (self.missing if self.runs else self.notes).extend(gaps.words(traced))
 
     def _run(self, mu: float) -> Ended:
@@ -240,12 +241,8 @@ class _CycleSearch:
 
         settled = self.method.settled(self.work, mu, [one for _, _, one in known], self._say, told)
         if settled.known is not None:
-            traced, k, one = known[settled.known]
+            traced, k, _ = known[settled.known]
             traced.stays.append((mu, k, k + 1))
-            number = 1 + [t for t in self.tracer.traced if t.cycles].index(traced)
-            self.notes.append(
-                f"μ = {mu:.6g}: a run in time settles in the cycle of {one.period:.6g} s of branch {number}"
-            )
             return "stays"
         if settled.new and any(traced.kept_by(last[0]) for traced in self.tracer.traced):
             return "stays"
