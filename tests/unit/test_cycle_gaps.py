@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, cast
 
-import pytest
-
 from stridor.study.cycle_branches import Traced
 from stridor.study.cycle_gaps import Gaps, covered
 
