@@ -221,9 +221,11 @@ def test_multipliers_count_only_where_the_motions_own_is_one(slow_belt: Cycles):
 def test_seconds_end_a_branch():
     """And that is said as what is missing, over a range and at a μ."""
     problem = mode_coupling(DAMPED, 0.1)
-    over = st.cycles(problem, between=(0.1, 1.8), method="harmonic", harmonics=5, seconds=1e-9)
+    over = st.cycles(problem, between=(0.1, 1.8), method="harmonic", harmonics=5, seconds=1e-9, runs=0)
     assert len(over.cycles) == 1
     assert over.missing == (f"branch 1: its 1e-09 s of computing were over at μ = {over.cycles[0].mu:.6g}",)
+    assert "no stable cycle was found between μ = 0.751899 and 1.8" in over.notes[-1]
+    assert over.notes[-1].endswith("no run in time was made there")
     at = st.cycles(problem, 1.0, method="harmonic", harmonics=5, seconds=1e-9)
     assert not at.cycles
     assert "it does not pass there; its 1e-09 s of computing were over" in at.missing[0]
@@ -251,7 +253,7 @@ def falling(speed: float = 1.0) -> System:
 
 @pytest.fixture(scope="module")
 def falling_branch() -> Cycles:
-    return st.cycles(falling(), between=(0.02, 0.3), method="harmonic")
+    return st.cycles(falling(), between=(0.02, 0.3), method="harmonic", runs=0)  # the branch of the onset alone
 
 
 def test_falling_friction_is_subcritical(falling_branch: Cycles):
@@ -459,7 +461,8 @@ def test_series_that_overshoot_beside_stick_do_not_turn(damping: float):
     """A mass on a belt whose friction falls never overtakes it, so slip comes to rest and goes on the same way (by
     integration of the equation of motion, too); what series of its slip have on the other side is their overshoot."""
     law = Hyperbolic(0.0, 1.0, 3.0)
-    found = st.cycles(block_on_belt(law=law, damping=damping, speed=0.5), between=(0.02, 0.3), method="harmonic")
+    system = block_on_belt(law=law, damping=damping, speed=0.5)
+    found = st.cycles(system, between=(0.02, 0.3), method="harmonic", runs=0)
     assert any("stick" in c.kinds for c in found.cycles)
     overshoot = [np.abs(c.slip_range).min() / c.slip_amplitude for c in found.cycles if c.slip_range.prod() < 0.0]
     assert 0.0 < max(overshoot) < 0.03

@@ -54,9 +54,17 @@ def cycles(
         typer.Option(
             "--seconds",
             help="Processor time: by shooting for a motion that comes back to nowhere [default: 60], by harmonic "
-            "balance for a branch [default: no limit].",
+            "balance for a branch [default: no limit] and a run [default: 60].",
         ),
     ] = None,
+    runs: Annotated[
+        int,
+        typer.Option(
+            "--runs",
+            min=0,
+            help="Most μ of a range at which runs in time look for cycles where no branch has a stable one; 0: none.",
+        ),
+    ] = 5,
     max_frequency: MaxFrequency = None,
     source: Source = None,
 ) -> None:
@@ -79,7 +87,7 @@ def cycles(
     between = work.modal.friction_range if friction_range is not None else None
     result = solve(
         work, values, between=between, method=chosen, harmonics=harmonics, push=pushes, points=points,
-        seconds=seconds, progress=_told(call),
+        seconds=seconds, runs=runs, progress=_told(call),
         keep=_kept(call),
     )  # fmt: skip
     call.keep(result, "cycles.nc")

@@ -59,7 +59,8 @@ class Bifurcation:
 class CycleBranch:
     """A branch that was followed: cycles (k,) the numbers of its cycles (from 0) in the order of the branch, begins and
     ends: why there is no more of it before the first and behind the last, in words; onset: the number (from 0) of the
-    onset that it begins at, None where it begins at none; folds: numbers of the cycles at which μ turns back."""
+    onset that it begins at, None where it begins at none; folds: numbers of the cycles at which μ turns back;
+    reached_from: how the first cycle of it was found that the others were followed from."""
 
     cycles: tuple[int, ...]
     begins: str
@@ -67,6 +68,7 @@ class CycleBranch:
     onset: int | None
     folds: tuple[int, ...]
     bifurcations: tuple[Bifurcation, ...]
+    reached_from: str = ""
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""
@@ -77,6 +79,7 @@ class CycleBranch:
             "onset": self.onset,
             "folds": list(self.folds),
             "bifurcations": [b.to_json() for b in self.bifurcations],
+            "reached_from": self.reached_from,
         }
 
 

@@ -255,7 +255,8 @@ def _branch(told: Any, count: int, onsets: int) -> CycleBranch:
     if not all(0 <= n < count for n in (*numbers, *folds)) or not (onset is None or 0 <= onset < onsets):
         raise ValueError("a branch of cycles that there are not")
     met = tuple(Bifurcation(**b) for b in told["bifurcations"])
-    return CycleBranch(numbers, str(told["begins"]), str(told["ends"]), onset, folds, met)
+    words = (str(told["begins"]), str(told["ends"]))
+    return CycleBranch(numbers, *words, onset, folds, met, str(told.get("reached_from", "")))
 
 
 def _stacked(rows: list[Any], dims: int) -> Any:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,9 @@ Kept = Callable[[], bool]
 
 @dataclass
 class Traced:
-    """A branch while it is followed: its cycles, closed and as data, which of them are folds, how it ends, and folds
-    of it that were passed and could not be closed."""
+    """A branch while it is followed: its cycles, closed and as data, which of them are folds, how it ends, folds of it
+    that were passed and could not be closed, and where runs in time stay: μ, and the numbers of the cycles before and
+    behind (of that cycle twice)."""
 
     method: Method[Any, Any]
     closed: list[Any] = field(default_factory=list[Any])
@@ -28,6 +30,8 @@ class Traced:
     ends: str = "it was stopped"
     onset: int | None = None
     unsolved: list[str] = field(default_factory=list[str])
+    reached_from: str = ""
+    stays: list[tuple[float, int, int]] = field(default_factory=list[tuple[float, int, int]])
 
     def add(self, closed: Any, said: str, *, fold: bool) -> None:
         """Another cycle behind the last."""
@@ -43,28 +47,39 @@ class Traced:
 
     def has(self, closed: Any) -> bool:
         """Whether a cycle lies on it: one of the branch, closed at its μ, is the same."""
-        mu = closed.mu
+        near = partial(self._near, closed.period)
+        return any(self.method.same(one, closed) for _, one in self.through(closed.mu, near))
+
+    def _near(self, period: float, k: int) -> bool:
+        shortest, longest = sorted((self.closed[k].period, self.closed[k + 1].period))
+        return shortest * (1 - APART) < period < longest * (1 + APART)
+
+    def through(self, mu: float, near: Callable[[int], bool] = lambda _: True) -> Iterator[tuple[int, Any]]:
+        """Its cycles at a μ, closed, from either of the two on both sides, with the number of the first of these."""
         for k in range(len(self.closed) - 1):
             one, other = self.closed[k], self.closed[k + 1]
-            if not min(one.mu, other.mu) <= mu <= max(one.mu, other.mu):
-                continue
-            shortest, longest = sorted((one.period, other.period))
-            if not shortest * (1 - APART) < closed.period < longest * (1 + APART):
+            if not min(one.mu, other.mu) <= mu <= max(one.mu, other.mu) or not near(k):
                 continue
             for start in (one, other):
                 try:
-                    if self.method.same(self.method.again(start, mu), closed):
-                        return True
+                    again = self.method.again(start, mu)
                 except (AnalysisError, np.linalg.LinAlgError):
                     continue
-        return False
+                yield k, again
+
+    def kept_by(self, closed: Any) -> bool:
+        """Note that a run stays in a cycle; False where the branch does not have it."""
+        own = [(k, k) for k, one in enumerate(self.closed) if (one.mu, one.period) == (closed.mu, closed.period)]
+        own = own or [(k, k + 1) for k, one in self.through(closed.mu) if self.method.same(one, closed)]
+        self.stays += [(closed.mu, *own[0])] if own else []
+        return bool(own)
 
     def result(self, first: int) -> CycleBranch:
         """As data; first: the number of its first cycle."""
         folds = turning([c.mu for c in self.cycles], [k for k, fold in enumerate(self.folds) if fold])
         return CycleBranch(
             tuple(range(first, first + len(self.cycles))), self.begins, self.ends, self.onset,
-            tuple(first + k for k in folds), bifurcations(self.cycles, folds),
+            tuple(first + k for k in folds), bifurcations(self.cycles, folds), self.reached_from,
         )  # fmt: skip
 
 
@@ -91,14 +106,18 @@ class Tracer:
             return f"the branch from the onset at μ = {onset.mu:.6g} leaves the range at once"
         if any(t.has(first) for t in self.traced):
             return ""
-        traced = Traced(self.method, begins=f"it begins at the onset at μ = {onset.mu:.6g}", onset=number)
+        traced = Traced(
+            self.method, begins=f"it begins at the onset at μ = {onset.mu:.6g}", onset=number,
+            reached_from=f"the onset at μ = {onset.mu:.6g}",
+        )  # fmt: skip
         self.traced.append(traced)
         self._follow(branch, traced, first, heading, traced.begins.removeprefix("it "), include=True, others=others)
         return ""
 
-    def from_cycle(self, closed: Any, said: str, others: tuple[CycleOnset, ...]) -> None:
-        """The branch that a cycle lies on, both ways."""
-        traced = Traced(self.method)
+    def from_cycle(self, closed: Any, said: str, others: tuple[CycleOnset, ...], *, joins: bool = False) -> Traced:
+        """The branch that a cycle lies on, both ways; ``said``: what the cycle was reached from; joins: up to where it
+        comes to another."""
+        traced = Traced(self.method, reached_from=said)
         self.traced.append(traced)
         for sense in (-1.0, 1.0):
             branch = self.method.branch(self.between)
@@ -109,8 +128,11 @@ class Tracer:
                 heading = None
             if sense < 0.0:
                 traced.add(closed, said, fold=False)
+                self.kept()
             if heading is not None:
-                self._follow(branch, traced, closed, heading, "along its branch", include=False, others=others)
+                self._follow(
+                    branch, traced, closed, heading, "along its branch", include=False, others=others, joins=joins
+                )
             if sense < 0.0:
                 traced.reverse()
         if traced.onset is None:
@@ -118,19 +140,26 @@ class Tracer:
                 for number, onset in enumerate(others):
                     if end.startswith("it begins at the onset") and f"{onset.mu:.6g}" in end:
                         traced.onset = number
+        return traced
 
     def _follow(
         self, branch: Any, traced: Traced, first: Any, heading: np.ndarray, said: str, *, include: bool,
-        others: tuple[CycleOnset, ...],
+        others: tuple[CycleOnset, ...], joins: bool = False,
     ) -> None:  # fmt: skip
+        joined = ""
+
         def seen(closed: Any, /, *, fold: bool) -> bool:
+            nonlocal joined
             traced.add(closed, said, fold=fold)
-            return self.kept()
+            if joins and (number := self._number(closed, traced)):
+                joined = f"it comes to branch {number} at μ = {closed.mu:.6g}"
+            return self.kept() and not joined
 
         if include and not seen(first, fold=False):
             return
         limit = self.method.branch_seconds
         traced.ends = follow(branch, first, heading, seen, self.points, limit, traced.unsolved.append)
+        traced.ends = joined or traced.ends
         if traced.ends.startswith("it comes to steady sliding"):
             last = traced.cycles[-1]
             for onset in others:
@@ -138,3 +167,8 @@ class Tracer:
                     abs(onset.mu - last.mu) < 0.1 * branch.width
                 ):
                     traced.ends = f"it begins at the onset at μ = {onset.mu:.6g}"
+
+    def _number(self, closed: Any, own: Traced) -> int:
+        """That of another branch that has a cycle, counted from 1; 0 where none has."""
+        shown = [t for t in self.traced if t.cycles]
+        return next((k for k, t in enumerate(shown, start=1) if t is not own and t.has(closed)), 0)

@@ -57,6 +57,16 @@ class Unreached:
     unclosed: Unclosed | None = None
 
 
+@dataclass(frozen=True)
+class Settled:
+    """Where a run in time stays: in the known cycle of that number, or (new) in the last one that it told of; late: its
+    time was over."""
+
+    known: int | None = None
+    new: bool = False
+    late: bool = False
+
+
 P = TypeVar("P")
 L = TypeVar("L")
 Say = Callable[[str], None]
@@ -204,34 +214,38 @@ class Harmonic:
     def settled(
         self, work: Workspace, mu: float, known: Sequence[series.Balanced], say: Say,
         told: Callable[[str, series.Balanced | Unreached], None],
-    ) -> None:  # fmt: skip
+    ) -> Settled:  # fmt: skip
         """What a run in time settles in, where steady sliding is unstable and none of the cycles known is stable."""
-        if any(self._stable(one) for one in known):
-            return
+        for number, one in enumerate(known):
+            if self._stable(one):
+                return Settled(number)
         try:
             mode = fastest(work, mu)
         except AnalysisError as error:
             told("", Unreached(f"μ = {mu:.6g}, from a run in time: {error}"))
-            return
+            return Settled()
         if mode is None:
-            return
+            return Settled()
         asked = Asked(HARMONICS, MOST_HARMONICS, DEFECT)
         if self.harmonics is not None:
             asked = Asked(self.harmonics, self.harmonics, math.inf)
         for share in RUN_PUSHES:
             push = share * float(self.family.speed.max(initial=0.0))
             run = SettledRun(work, self.family, mu, push, min(self.branch_seconds, SECONDS), say)
-            said = f"a run in time from a push of {push:.4g} m/s"
+            pushed_by = f"from a push of {push:.4g} m/s"
+            said, where = f"a run in time at μ = {mu:.6g} {pushed_by}", Settled()
             try:
                 for closed, stays in run.cycles(mode, asked, self._stable):
-                    if any(alike(other, closed) for other in known):
-                        continue  # a branch has it
-                    told(said if stays else f"{said}, which passes near to it", closed)
-                return
+                    had = next((k for k, other in enumerate(known) if alike(other, closed)), None)
+                    where = Settled(had, had is None) if stays else where
+                    if had is None:  # no branch has it
+                        told(said if stays else f"{said}, which passes near to it", closed)
+                return where
             except (AnalysisError, CaseError, np.linalg.LinAlgError) as error:
-                told(said, Unreached(f"μ = {mu:.6g}, from {said}: {error}"))
+                told(said, Unreached(f"μ = {mu:.6g}, from a run in time {pushed_by}: {error}"))
             if run.late:
-                return
+                return Settled(late=True)
+        return Settled()
 
     def _stable(self, cycle: series.Balanced) -> bool | None:
         return series.sampled_series(cycle, "").stable

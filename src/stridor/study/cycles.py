@@ -18,6 +18,7 @@ from ..typing import Array
 from .analyses import onsets
 from .asked import require_friction
 from .cycle_branches import Tracer
+from .cycle_gaps import MOST_RUNS, NARROW, Ended, Gaps, covered, growing
 from .cycle_methods import SECONDS, Harmonic, Method, MethodName, Shooting, Unreached
 from .fingerprint import fingerprint
 from .provenance import provenance
@@ -39,6 +40,7 @@ def cycles(
     push: float | Sequence[float] | None = None,
     points: int = 120,
     seconds: float | None = None,
+    runs: int = MOST_RUNS,
     progress: Callable[[int, str], None] | None = None,
     keep: Callable[[Cycles], None] | None = None,
 ) -> Cycles:
@@ -54,11 +56,12 @@ def cycles(
     and where none of these is stable and steady sliding is unstable, that in which a run in time settles.
     between (low, high) (default, without mu: modal.friction_range): the branches that begin at the onsets of steady
     sliding, through folds, and by shooting those of cycles that motions run into just below the lowest onset, at the
-    upper end, and at ``mu``. push [m/s]: by how much the slip velocities are pushed off steady sliding (default: one
-    and three times the slip speed). points: most cycles of a branch, each way; seconds: of processor time, by
-    shooting for a motion that comes back to nowhere (default: 60), by harmonic balance for following a branch (default:
-    no limit) and a run (60). progress: called with the number of cycles so far and what is done; keep: with what was
-    found so far, behind each cycle. Ctrl-C ends the search and gives what was found.
+    upper end, and at ``mu``; then, where steady sliding is unstable and none of these has a stable cycle, those that
+    runs in time lead to, at ``runs`` μ at most. push [m/s]: by how much the slip velocities are pushed off steady
+    sliding (default: one and three times the slip speed). points: most cycles of a branch, each way; seconds: of
+    processor time, by shooting for a motion that comes back to nowhere (default: 60), by harmonic balance for following
+    a branch (default: no limit) and a run (60). progress: called with the number of cycles so far and what is done;
+    keep: with what was found so far, behind each cycle. Ctrl-C ends the search and gives what was found.
 
     Cycles to which no motion and no branch leads are not found. Raises CaseError for what the method does not take and
     where nothing slides, AnalysisError where steady sliding does not exist.
@@ -75,6 +78,8 @@ def cycles(
         raise CaseError("points", points, "a whole number, at least 2 cycles of a branch")
     if seconds is not None and not seconds > 0.0:
         raise CaseError("seconds", seconds, "a time > 0 [s]")
+    if not (float(runs).is_integer() and runs >= 0):
+        raise CaseError("runs", runs, "a whole number of runs in time, 0 for none")
     if work.varies:
         raise CaseError("case", "matrices that depend on mu", "cycles of a system whose matrices do not")
     if harmonics is not None and not (float(harmonics).is_integer() and 1 <= harmonics <= MOST_ASKED):
@@ -91,7 +96,7 @@ def cycles(
         if not (np.isfinite(low) and np.isfinite(high) and 0.0 <= low < high):
             raise CaseError("between", between, "two finite friction coefficients 0 ≤ low < high")
         between = low, high
-    search = _CycleSearch(work, between, chosen, harmonics, pushes, points, seconds, progress, keep, started)
+    search = _CycleSearch(work, between, chosen, harmonics, pushes, points, seconds, runs, progress, keep, started)
     try:
         search.run(values)
     except KeyboardInterrupt:
@@ -122,13 +127,12 @@ class _CycleSearch:
 
     def __init__(
         self, work: Workspace, between: tuple[float, float] | None, chosen: str, harmonics: int | None,
-        pushes: list[float] | None, points: int, seconds: float | None, progress: Callable[[int, str], None] | None,
-        keep: Callable[[Cycles], None] | None,
-        started: float,
+        pushes: list[float] | None, points: int, seconds: float | None, runs: int,
+        progress: Callable[[int, str], None] | None, keep: Callable[[Cycles], None] | None, started: float,
     ) -> None:  # fmt: skip
         self.work, self.between, self.pushes, self.seconds = work, between, pushes, seconds
         self.progress, self.keep, self.started, self.points = progress, keep, started, points
-        self.harmonics = harmonics
+        self.harmonics, self.runs = harmonics, runs
         self.notes: list[str] = list(work.one_for_all)
         self.slides = between or (0.0, math.inf)  # what of the range has steady sliding
         self.method: Method[Any, Any] = self._method(chosen)
@@ -138,7 +142,7 @@ class _CycleSearch:
         self.missing: list[str] = []
         self.unclosed: list[Unclosed] = []
         self.interrupted = False
-        self.doing = ""
+        self.doing, self.filling = "", False
 
     def _method(self, chosen: str) -> Method[Any, Any]:
         system = self.work.system()
@@ -162,8 +166,9 @@ class _CycleSearch:
         looked = list(values)
         if self.method.name == "harmonic":
             self.notes.append(
-                "harmonic balance follows branches from the onsets, and at a single μ where none of them has a stable "
-                "cycle a run in time: cycles that neither leads to are not looked for"
+                "harmonic balance follows branches from the onsets, and where none of them has a stable cycle and "
+                f"steady sliding is unstable runs in time, over a range at {self.runs} μ at most: cycles that neither "
+                "leads to are not looked for"
             )
         if self.between is not None:
             self.onsets = self._onsets(self.between)
@@ -187,13 +192,77 @@ class _CycleSearch:
                 self.missing.append(f"μ = {mu:.6g}: {error}")
         if self.between is None and unanswered and len(unanswered) == len(looked):
             raise unanswered[0]
+        if self.between is not None:
+            self._fill()
 
-    def _more(self, values: list[float]) -> list[float]:
-        """Where else in the range cycles are looked for."""
+    def _fill(self) -> None:
+        """Runs, or motions of shooting, where over the range steady sliding is unstable and no branch has a stable
+        cycle, and the branches of what they come to."""
+        low, high = self.slides
+        try:
+            where = growing(self.work, self._sliding(), self.onsets)
+        except AnalysisError as error:
+            self.missing.append(f"where steady sliding is unstable is not known: {error}")
+            return
+        gaps, traced = Gaps(where, NARROW * (high - low)), self.tracer.traced
+        self.filling = True
+        for number in range(1, self.runs + 1):
+            if (chosen := gaps.next(traced)) is None:
+                break
+            mu, (low, high) = chosen
+            self._say(
+                f"run {number} of at most {self.runs} in time, at μ = {mu:.6g}: no stable cycle is known between "
+                f"μ = {low:.6g} and {high:.6g}"
+            )
+            try:
+                ended = self._run(mu)
+            except AnalysisError as error:
+                self.missing.append(f"μ = {mu:.6g}: {error}")
+                ended = "lost"
+            gaps.runs.append((mu, ended))
+        self.notes += gaps.trusted(traced)
+        (self.missing if self.runs else self.notes).extend(gaps.words(traced))
+
+    def _run(self, mu: float) -> Ended:
+        """What a run at a μ comes to, with its branch; how it ended."""
+        if not isinstance(self.method, Harmonic):
+            self._at(mu)
+            met = [part for traced in self.tracer.traced for part in covered(traced)]
+            return "stays" if any(low <= mu <= high for low, high in met) else "lost"
+        known = [(traced, k, one) for traced in self.tracer.traced for k, one in traced.through(mu)]
+        last: list[Any] = []
+
+        def told(said: str, found: Any) -> None:
+            if isinstance(found, Unreached):
+                self._missed(found)
+            else:
+                last[:] = [found]
+                self._add(found, said)
+
+        settled = self.method.settled(self.work, mu, [one for _, _, one in known], self._say, told)
+        if settled.known is not None:
+            traced, k, _ = known[settled.known]
+            traced.stays.append((mu, k, k + 1))
+            return "stays"
+        if settled.new and any(traced.kept_by(last[0]) for traced in self.tracer.traced):
+            return "stays"
+        return "late" if settled.late else "lost"
+
+    def _missed(self, found: Unreached) -> None:
+        (self.notes if found.expected else self.missing).append(found.words)
+        self.unclosed += [found.unclosed] if found.unclosed is not None else []
+
+    def _sliding(self) -> tuple[float, float]:
+        """The range, as far as it has steady sliding."""
         assert self.between is not None
         low, high = self.slides
         if high < self.between[1]:  # at its very end contacts part at once
             high -= SHORT * (high - low)
+        return low, high
+
+    def _more(self, values: list[float]) -> list[float]:
+        """Where else in the range cycles are looked for."""
+        low, high = self._sliding()
         lowest = min((o.mu for o in self.onsets), default=high)
         below = max(low, lowest - BELOW * (high - low))
         return [mu for mu in dict.fromkeys((below, high)) if mu not in values]
@@ -205,8 +274,7 @@ class _CycleSearch:
 
         def told(said: str, found: Any) -> None:
             if isinstance(found, Unreached):
-                (self.notes if found.expected else self.missing).append(found.words)
-                self.unclosed += [found.unclosed] if found.unclosed is not None else []
+                self._missed(found)
             elif not any(self.method.same(found, other) for other in here):
                 here.append(found)
                 self._add(found, said)
@@ -217,15 +285,13 @@ class _CycleSearch:
 
     def _add(self, closed: Any, said: str) -> None:
         """A cycle, with its branch where a range is asked for that holds it."""
-        within = self.between is not None and self.between[0] <= closed.mu <= self.between[1]
-        if within and any(traced.has(closed) for traced in self.tracer.traced):
-            return
-        if within:
-            self._say(f"branch of the cycle at μ = {closed.mu:.6g}")
-            self.tracer.from_cycle(closed, said, self.onsets)
-        else:
+        if self.between is None or not self.between[0] <= closed.mu <= self.between[1]:
             self.single.append(self.method.sampled(closed, said))
             self._kept()
+        elif not any(traced.has(closed) for traced in self.tracer.traced):
+            self._say(f"branch of the cycle at μ = {closed.mu:.6g}")
+            said = said if f"at μ = {closed.mu:.6g}" in said else f"{said} at μ = {closed.mu:.6g}"
+            self.tracer.from_cycle(closed, said, self.onsets, joins=self.filling)
 
     def _say(self, doing: str) -> None:
         self.doing = doing
@@ -255,7 +321,7 @@ class _CycleSearch:
         made = provenance(
             self.work, "cycles", time.perf_counter() - self.started,
             between=None if self.between is None else list(self.between), push=self.pushes,
-            points=self.points, method=self.method.name, harmonics=self.harmonics,
+            points=self.points, method=self.method.name, harmonics=self.harmonics, runs=self.runs,
         )  # fmt: skip
         if self.work.given is not None:
             made["fingerprint"] = fingerprint(self.work.given, None)

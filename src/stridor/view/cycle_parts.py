@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..digits import hertz, readable
-from ..periodic import Cycle, Cycles
+from ..periodic import Cycle, CycleBranch, Cycles
 from .cycle_plots import cycle_branches, cycle_period, loudest_contact
 from .inputs import ReportInputs
 from .page_parts import ReportFigure
@@ -32,12 +32,18 @@ def worth_a_row(result: Cycles) -> list[int]:
 
 
 def branch_words(result: Cycles) -> list[str]:
-    """Each branch in a line: how many cycles, from where to where, what happens between."""
+    """Each branch in a line: how many cycles, what it was followed from where that is no onset, from where to where,
+    what happens between."""
     return [
-        f"branch {k}, {len(branch.cycles)} cycles: "
+        f"branch {k}, {len(branch.cycles)} cycles{_followed_from(branch)}: "
         + "; ".join((branch.begins, *(b.sentence for b in branch.bifurcations), branch.ends))
         for k, branch in enumerate(result.branches, start=1)
     ]
+
+
+def _followed_from(branch: CycleBranch) -> str:
+    told = branch.reached_from
+    return f", followed from {told}" if told and not told.startswith("the onset") else ""
 
 
 def cycle_words(result: Cycles) -> tuple[str, ...]:
