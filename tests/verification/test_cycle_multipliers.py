@@ -117,7 +117,7 @@ def test_random_cycles_that_only_slip_have_the_multipliers_of_their_motions(seed
     assert met > len(seeds)
 
 
-@pytest.mark.parametrize("rigid", [False, True])
+@pytest.mark.parametrize("rigid", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_hill_and_motions_followed_have_the_same(rigid: bool, monkeypatch: pytest.MonkeyPatch):
     """Each by itself; a rigid contact leaves two motions less, which Hill's determinant has at zero."""
     masses = Masses(7)

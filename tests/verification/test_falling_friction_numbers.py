@@ -33,9 +33,8 @@ def falling():
     "path",
     [
         "contacts.A.friction.decay_speed",
-        "contacts.A.friction.static_coefficient",
-        "contacts.A.friction.coefficient",
-        "supports.clamp.velocity.x",
+        *(pytest.param(f"contacts.A.friction.{name}", marks=pytest.mark.slow) for name in ("static_coefficient", "coefficient")),
+        pytest.param("supports.clamp.velocity.x", marks=pytest.mark.slow),
         "materials.steel.density",
     ],
 )
