@@ -36,7 +36,7 @@ def test_a_contact_that_touches_without_force_has_no_pattern_and_no_warning(forc
     nodes: Any = SimpleNamespace(count=4, area=np.ones(4), gap=np.zeros(4), closed=np.zeros(4, dtype=bool))
     surface = SimpleNamespace(
         name="rub", nodes=nodes, facets=facets, slave_position=positions, master=Flat(np.zeros(2), np.array([0.0, 1.0])),
-        location=SimpleNamespace(normal=np.tile([0.0, 1.0], (4, 1)), gap=np.zeros(4)),
+        location=SimpleNamespace(normal=np.tile([0.0, 1.0], (4, 1)), gap=np.zeros(4)), own=np.arange(4),
     )  # fmt: skip
     system: Any = system_of((), (surface,), nodes)
     with warnings.catch_warnings():
@@ -77,6 +77,15 @@ def test_neighbours_are_those_along_the_outline(kind: str) -> None:
         assert np.array_equal(found, wanted), left_out
 
 
+def test_nodes_that_are_one_have_the_neighbours_of_both() -> None:
+    """A line whose ends are one node is a ring; between two that are one there is nothing."""
+    lines = np.column_stack([np.arange(4), np.arange(1, 5)])
+    facets = SlaveFacets({"line": lines}, np.arange(5), {})
+    found = _neighbours(facets, 4, np.array([0, 1, 2, 3, 0])).toarray()
+    assert np.array_equal(found, [[0, 1, 0, 1], [1, 0, 1, 0], [0, 1, 0, 1], [1, 0, 1, 0]])
+    assert np.array_equal(_neighbours(facets, 3, np.array([0, 1, 2, 1, 1])).toarray(), [[0, 1, 0], [1, 0, 1], [0, 1, 0]])
+
+
 # -- a grid of nodes on a flat master ----------------------------------------------------------------------------------
 
 
@@ -98,8 +107,8 @@ def words_of(force, gap, *, before=None, area=1.0, others: int = 3, closed=False
     master = Flat(np.zeros(3), np.array([0.0, 0.0, 1.0]))
     nodes = SimpleNamespace(count=n * n, closed=(closed,))
     surface = SimpleNamespace(
-        name="pad", nodes=nodes, facets=facets, slave_position=positions, master=master, location=location
-    )
+        name="pad", nodes=nodes, facets=facets, slave_position=positions, master=master, location=location, own=np.arange(n * n),
+    )  # fmt: skip
     plain = SimpleNamespace(nodes=SimpleNamespace(count=others, closed=()), facets=None, name="plain")
     count = others + 2 + n * n
     lead = np.full(others + 2, 7.0)
@@ -211,7 +220,7 @@ def two_contacts(gap, *, master, normal=None, first: int = 2) -> Any:
     shaft = SimpleNamespace(
         name="shaft", nodes=SimpleNamespace(count=m, closed=()), slave_position=0.2 * round_about, master=master,
         location=SimpleNamespace(normal=-round_about if normal is None else normal, gap=np.asarray(gap)),
-        facets=SlaveFacets.of(round_about, {"line": cells}, np.arange(m)),
+        facets=SlaveFacets.of(round_about, {"line": cells}, np.arange(m)), own=np.arange(m),
     )  # fmt: skip
     gaps = np.concatenate([np.full(1 + first, 9e-6), gap])
     nodes = SimpleNamespace(gap=gaps, area=np.ones(len(gaps)), count=len(gaps))

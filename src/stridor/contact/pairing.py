@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -17,10 +18,12 @@ from .coupling import SlaveFacets, coupled
 from .curve import Curve
 from .facets import FacetSurface
 from .interface import Rows
+from .joined import joined
 from .master import Location, MasterSurface
 from .pieces import OPPOSED
 from .rim import Hanging, hanging
 from .surfaces import SurfaceContact, operators
+from .ties import Bond
 
 
 def pair_surface(
@@ -42,6 +45,8 @@ def pair_surface(
     adjust: bool = False,
     facets: Blocks | None = None,
     thickness: float = 1.0,
+    freedoms: IntArray | None = None,
+    repeats: Sequence[Bond] = (),
 ) -> SurfaceContact:
     """A surface contact of those slave nodes that the undisplaced master faces.
 
@@ -57,7 +62,8 @@ def pair_surface(
 
     facets: those between the slave nodes, by kind; in the plane of a ``thickness`` [m]. With them contacts of
     quadratic facets are weighted over facets (`coupling`), which also says what area a node stands for; without, each
-    node stands by itself.
+    node stands by itself. freedoms (m, d) of the slave nodes' displacements, and the bonds by which bodies repeat:
+    slave nodes that these make one are one node of the contact (`joined`).
 
     Raises CaseError naming ``where`` when no node faces the master, or when nodes overlap it by more than that.
     """
@@ -88,6 +94,9 @@ def pair_surface(
         position = position - moved[:, None] * location.normal
         location = replace(location, gap=location.gap - moved)
     coupling = coupled(around, position, area, location, master)
+    one = joined(freedoms[facing], location.normal, repeats) if freedoms is not None and len(repeats) else None
+    if one is not None:
+        location = one.even(location, coupling.area)
     nodes = operators(
         name,
         slave=slave,
@@ -99,6 +108,7 @@ def pair_surface(
         law=law,
         location=location,
         coupling=coupling,
+        joined=one,
     )
     return SurfaceContact(
         name=name,
@@ -114,6 +124,7 @@ def pair_surface(
         location=location,
         nodes=nodes,
         facets=around,
+        joined=one,
     )
 
 
@@ -207,6 +218,8 @@ def repair(
         contact.master,
         master_displacement,
     )
+    if contact.joined is not None:
+        location = contact.joined.even(location, contact.area)
     relative = now.slave @ slave_displacement - now.master @ master_displacement
     reference = replace(now, area=contact.area, gap=now.gap - np.sum(location.normal * relative, axis=1))
     nodes = operators(
@@ -220,10 +233,13 @@ def repair(
         law=contact.law,
         location=location,
         coupling=reference,
+        joined=contact.joined,
     )
     left = ~location.inside
     if now.hanging is not None:
         left &= ~now.hanging
+    if contact.joined is not None:  # of one node all parts
+        left = np.bincount(contact.own, weights=~left) == 0.0
     return replace(contact, location=location, nodes=nodes), np.flatnonzero(left)
 
 

@@ -9,9 +9,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..laws.friction import FrictionLaw
-from ..typing import Array, Sparse
+from ..typing import Array, IntArray, Sparse
 from .coupling import Coupling, SlaveFacets, collocated
 from .interface import Rows
+from .joined import Joined
 from .master import Location, MasterSurface
 from .nodes import ContactNodes
 
@@ -24,7 +25,8 @@ class SurfaceContact:
     master_rows (k d, n) belong to the k nodes of master. drift (m, d, p) [m/s]: velocity of the slave's material
     against the master's at each slave node for a body that slides through its mesh (a turning disc), for each
     prescribed motion at factor one. stiffness_per_area [N/m³], infinite for rigid. facets: those between the slave
-    nodes where they are known. Slave nodes that the master does not face at the start take no part.
+    nodes where they are known. Slave nodes that the master does not face at the start take no part. joined: which of
+    the m are one node of the contact, as the body repeats; None where none are.
     """
 
     name: str
@@ -40,6 +42,12 @@ class SurfaceContact:
     location: Location
     nodes: ContactNodes
     facets: SlaveFacets | None = None
+    joined: Joined | None = None
+
+    @property
+    def own(self) -> IntArray:
+        """Which of ``nodes`` each slave node (m,) is."""
+        return np.arange(len(self.slave_position)) if self.joined is None else self.joined.into
 
     def rigid(self) -> SurfaceContact:
         """The same contact without compliance."""
@@ -80,14 +88,18 @@ def operators(
     law: FrictionLaw,
     location: Location,
     coupling: Coupling | None = None,
+    joined: Joined | None = None,
 ) -> ContactNodes:
     """Normal and tangential rows of slave nodes at a location on their master.
 
-    coupling: how they hang on slave and master nodes, each by itself where it is None.
+    coupling: how they hang on slave and master nodes, each by itself where it is None. joined: which are one node, at
+    a location that is `Joined.even`.
     """
     count, d = slave_position.shape
     slip = drift.sum(axis=2) if drift.shape[2] else None
     tangents = frames(location.normal, slip)
+    if joined is not None:
+        tangents = joined.tangents(tangents)
     if coupling is None:
         coupling = collocated(location, area, master_rows.free.shape[0] // d)
 
@@ -103,7 +115,7 @@ def operators(
     # Material that slides through its mesh moves the surface's points along it, never the surface.
     tangent_lift = tangent_lift + np.einsum("mqd,mdp->mqp", tangents, drift).reshape(tangent_lift.shape)
     stiffness = stiffness_per_area * coupling.area
-    return ContactNodes(
+    apart = ContactNodes(
         names=(name,),
         owner=np.zeros(count, dtype=np.int64),
         laws=(law,),
@@ -118,6 +130,7 @@ def operators(
         normals=location.normal,
         tangents=tangents,
     )
+    return apart if joined is None else joined.nodes(apart)
 
 
 def _along(weights: Sparse, directions: Array) -> Sparse:

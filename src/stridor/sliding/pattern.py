@@ -16,7 +16,7 @@ from ..contact.coupling import SlaveFacets
 from ..contact.pairing import overlap_tolerance
 from ..contact.surfaces import SurfaceContact
 from ..system import System
-from ..typing import Array, BoolArray, Sparse
+from ..typing import Array, BoolArray, IntArray, Sparse
 
 # A node is surrounded by pressure where its neighbours have this part of the mean.
 PRESSED = 0.2
@@ -49,7 +49,7 @@ def unexplained_patterns(system: System, normal_force: Array, gap: Array, active
         # A contact may touch without any force; one kept closed is open nowhere, and its pressure may change sign.
         if surface.facets is None or any(surface.nodes.closed) or not loaded.any():
             continue
-        around = _neighbours(surface.facets, surface.nodes.count)
+        around = _neighbours(surface.facets, surface.nodes.count, surface.own)
         by_mesh = _open_by_mesh(surface, loaded, nodes.gap[mine], gap[mine])
         if by_mesh:
             yield by_mesh
@@ -113,11 +113,16 @@ def _open_by_mesh(surface: SurfaceContact, loaded: BoolArray, gap_before: Array,
     )
 
 
-def _neighbours(facets: SlaveFacets, count: int) -> Sparse:
-    """Which slave nodes (m, m) follow each other on the outline of a facet, ones without the diagonal."""
+def _neighbours(facets: SlaveFacets, count: int, own: IntArray | None = None) -> Sparse:
+    """Which nodes (m, m) of a contact follow each other on the outline of a facet, ones without the diagonal.
+
+    own: which of these each slave node is, where some are one."""
     ends = [facets.own[block[:, list(pair)]] for kind, block in facets.blocks.items() for pair in OUTLINES[kind]]
     both = np.concatenate(ends)
     both = both[np.all(both >= 0, axis=1)]
+    if own is not None:
+        both = own[both]
+        both = both[both[:, 0] != both[:, 1]]
     row, column = np.concatenate([both, both[:, ::-1]]).T
     found = sp.csr_array((np.ones(len(row)), (row, column)), shape=(count, count))
     found.data[:] = 1.0

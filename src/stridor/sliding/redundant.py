@@ -50,6 +50,28 @@ def redundant(system: System, nodes: ContactNodes, rigid: BoolArray) -> str:
     )
 
 
+def nearly_one(system: System, touches: BoolArray, rigid: BoolArray) -> str:
+    """Which rigid contact, of those with a node that touches (m,), has slave nodes that a repeating tie makes nearly
+    one, as its meshes do not match, in words; "" for none.
+
+    Such a node follows several of the others. Their rows differ by what the meshes do, so that no rank tells of them,
+    and the forces are as good as not unique: one of them takes all, the other one opens.
+    """
+    for surface, mine in system.nodes_of_surfaces():
+        one = surface.joined
+        if one is None or not len(one.doubtful) or not (touches[mine] & rigid[mine]).any():
+            continue
+        who = ", ".join(words(system.holders, [surface.name]))
+        at = ", ".join(f"{x:.6g}" for x in surface.nodes.position[one.doubtful[0]])
+        return (
+            "steady sliding: rigid contact presses on the same freedoms twice: of the slave nodes on the cut through a "
+            f"body that repeats {len(one.doubtful)} {'follows' if len(one.doubtful) == 1 else 'follow'} several "
+            f"others, as the meshes of both sides do not match there, first at ({at}) m ({who}); let them match, or "
+            "give the contact a stiffness"
+        )
+    return ""
+
+
 def closed(active: BoolArray, gap: Array, displacement: Array) -> BoolArray:
     """Nodes (m,) that touch, with a force or without: where another one took the whole force, both could have it."""
     scale = max(float(np.abs(displacement).max(initial=0.0)), float(np.abs(gap).max(initial=0.0)))

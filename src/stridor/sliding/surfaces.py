@@ -27,7 +27,7 @@ from .equilibrium import Equilibrium, NodeEquilibrium, find_touching, sets_near
 from .history import STILL, follow
 from .pattern import left_by_facets, unexplained_patterns
 from .points import external_force, full_motion, words_of_friction
-from .redundant import closed, redundant
+from .redundant import closed, nearly_one, redundant
 from .resultants import Balance, Resultant, balance, resultants
 
 ALL_TRIED = 5  # nodes of which it is looked whether other sets are in equilibrium as well
@@ -173,7 +173,8 @@ def steady_sliding_nodes(
     residual = equilibrium.residual(state)
     _require_held(system, nodes, state, residual)
     touches = closed(state.active, state.gap, state.displacement)
-    if twice := redundant(system, nodes, touches & (nodes.compliance == 0.0)):
+    rigid = nodes.compliance == 0.0
+    if twice := nearly_one(system, touches, rigid) or redundant(system, nodes, touches & rigid):
         raise AnalysisError(twice)
     # What presses by rounding of other forces does not press.
     least = PRESSED * float(np.abs(force).max(initial=0.0))

@@ -59,7 +59,7 @@ def build_system(
     if not len(free):
         raise CaseError("supports", None, "hold every degree of freedom of the case; leave some of them free")
     motion = _with_sliding(case, motion)
-    view = View(bodies, total, free, motion, constraints, tie)
+    view = View(bodies, total, free, motion, constraints, tie, () if tied is None else tied.repeats)
     points = {at: view.point_rows(case, at) for at in _references(case)}
     loads = {name: _load(case, view, name, load) for name, load in case.loads.items()}
     contacts, surfaces = [], []

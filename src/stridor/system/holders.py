@@ -13,7 +13,8 @@ from ..contact.interface import Contact
 from ..contact.surfaces import SurfaceContact
 from ..errors import CaseError
 from ..typing import Array, IntArray
-from .supports import boundary_nodes, master_surface
+from .repeats import master_nodes
+from .supports import boundary_nodes
 from .view import View, nearest_node
 
 # A row of relative displacements has weights of one; below this part of it, rounding is all that moves.
@@ -79,8 +80,7 @@ def _touched(case: Case, view: View, contact: Contact | SurfaceContact) -> IntAr
     elif body.beam is not None:
         return slave  # a line under a whole boundary: its ends say little of what presses where
     else:
-        assert body.mesh is not None, "checked: boundaries belong to meshes"
-        nodes = master_surface(body.mesh, boundary, f"contacts.{contact.name}.master")[1]
+        nodes = master_nodes(case, body, boundary, f"contacts.{contact.name}.master")[1]
         nodes = nodes[np.unique(contact.location.nodes[contact.location.weights != 0.0])]
     return np.concatenate([slave, body.displacements(nodes).ravel()])
 

@@ -20,9 +20,9 @@ from ..errors import CaseError
 from ..mesh.boundary import require_boundary
 from ..mesh.facets import nodal_areas, nodal_normals
 from ..mesh.model import Blocks
-from ..typing import Array
+from ..typing import Array, IntArray
 from .motion import distance_name
-from .supports import master_surface
+from .repeats import master_nodes, master_rows
 from .view import View, point_position
 
 
@@ -62,7 +62,7 @@ def point_contact(case: Case, view: View, name: str, contact: ContactCase) -> Co
 def surface_contact(case: Case, view: View, name: str, contact: ContactCase) -> SurfaceContact:
     """Slave nodes of a boundary, or one point, on a boundary or an obstacle."""
     where = f"contacts.{name}"
-    slave_rows, position, area, normals, facets = _slave(case, view, where, contact)
+    slave_rows, position, area, normals, facets, freedoms = _slave(case, view, where, contact)
     master, master_rows = _master(case, view, where, contact)
     slave_body = case.location(contact.slave).body
     drift = _drift(case, view, slave_body, contact.master.partition(".")[0], position)
@@ -83,6 +83,8 @@ def surface_contact(case: Case, view: View, name: str, contact: ContactCase) -> 
         adjust=contact.adjust > 0,
         facets=facets,
         thickness=_thickness(case, slave_body, position.shape[1]),
+        freedoms=freedoms,
+        repeats=view.repeats,
     )
     if facets is None:
         # A point stands for no area: its stiffness is in N/m, and it has no pressure.
@@ -101,23 +103,23 @@ def _overlapping(view: View, name: str, contact: ContactCase, lift: Array) -> Ar
 
 def _slave(
     case: Case, view: View, where: str, contact: ContactCase
-) -> tuple[Rows, Array, Array, Array, Blocks | None]:
+) -> tuple[Rows, Array, Array, Array, Blocks | None, IntArray | None]:
     """Rows (m d, n), positions (m, d), areas (m,) and outward normals (m, d) of the slave, and the facets between
-    its nodes, None for a point."""
+    its nodes and freedoms (m, d) of their displacements, None for a point."""
     at = case.location(contact.slave, where=f"{where}.slave")
     body = view.bodies[at.body]
     d = body.dimension
     if isinstance(at, PointRef):
         rows = view.point_rows(case, contact.slave)
         position = point_position(case, view.bodies, at)[None, :]
-        return Rows(rows.free[:d], rows.lift[:d]), position, np.ones(1), np.zeros((1, d)), None
+        return Rows(rows.free[:d], rows.lift[:d]), position, np.ones(1), np.zeros((1, d)), None, None
     assert body.mesh is not None, "checked: boundaries belong to meshes"
     facets = require_boundary(body.mesh, at.boundary, f"{where}.slave")
     nodes = np.unique(np.concatenate([block.ravel() for block in facets.values()]))
     area = nodal_areas(body.points, facets, thickness=_thickness(case, at.body, d))[nodes]
     normals = nodal_normals(body.points, facets)[nodes]
     own = {kind: np.searchsorted(nodes, block) for kind, block in facets.items() if len(block)}
-    return view.node_rows(body, nodes), body.points[nodes], area, normals, own
+    return view.node_rows(body, nodes), body.points[nodes], area, normals, own, body.displacements(nodes)
 
 
 def _thickness(case: Case, body: str, dimension: int) -> float:
@@ -139,9 +141,8 @@ def _master(case: Case, view: View, where: str, contact: ContactCase) -> tuple[M
         lines = np.stack([np.arange(len(order) - 1), np.arange(1, len(order))], axis=1)
         line = Curve.from_facets(body.points[order], {"line": lines}, where=f"{where}.master", follows_spline=True)
         return line, view.node_rows(body, order)
-    assert body.mesh is not None, "checked: boundaries belong to meshes"
-    surface, nodes = master_surface(body.mesh, boundary, f"{where}.master")
-    return surface, view.node_rows(body, nodes)
+    surface, nodes, turns = master_nodes(case, body, boundary, f"{where}.master")
+    return surface, master_rows(view, body, nodes, turns)
 
 
 def _obstacle(table: ObstacleBody) -> MasterSurface:

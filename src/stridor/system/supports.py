@@ -116,12 +116,13 @@ def master_surface(mesh: Mesh, boundary: str, where: str) -> tuple[Curve | Facet
 @dataclass(frozen=True)
 class Tied:
     """T (N, N) with u = T u_independent; freedoms that follow (f,); by which shares (N, N) masses follow, None where
-    those of T do. words: warnings."""
+    those of T do. words: warnings. repeats: the bonds of bodies that repeat."""
 
     matrix: Sparse
     followers: IntArray
     shares: Sparse | None = None
     words: tuple[str, ...] = ()
+    repeats: tuple[Bond, ...] = ()
 
     def within(self, matrix: Sparse) -> Sparse:
         """TᵀAT (N, N) csr. Few rows of a large A know of a tie: the others stay as they are."""
@@ -161,6 +162,7 @@ def tie_matrix(
     held[list(names)] = True
     alone = held | _slaves_twice(case, bodies, total)
     bonds: list[Bond] = []
+    repeats: list[Bond] = []
     words: list[str] = []
     repeated: set[int] = set()
     for name, tie in case.ties.items():
@@ -174,6 +176,8 @@ def tie_matrix(
             bond = bond.only(~again)
             repeated.update(bond.slave.ravel().tolist())
         bonds.append(bond)
+        if tie.translation is not None or tie.rotation is not None:
+            repeats.append(bond)
     moving = columns(list(constraints))
     prescribed = np.zeros((total, len(moving)))
     for number, column in enumerate(moving):
@@ -181,7 +185,7 @@ def tie_matrix(
     tied = np.unique(np.concatenate([b.slave.ravel() for b in bonds]))
     matrix, followers = led_by_supports(tie_transformation(total, bonds), tied, held, prescribed, names)
     if all(bond.rotation is None for bond in bonds):
-        return Tied(matrix, followers, words=tuple(words))
+        return Tied(matrix, followers, words=tuple(words), repeats=tuple(repeats))
     shares = tie_transformation(total, [bond.shares for bond in bonds], checked=False)
     changed = np.setxor1d(followers, tied)
     if len(changed):
@@ -191,7 +195,7 @@ def tie_matrix(
         led = np.zeros(total)
         led[changed] = 1.0
         shares = sp.csr_array((sp.diags_array(keep) @ shares + sp.diags_array(led)) @ _shared(matrix, changed))
-    return Tied(matrix, followers, shares, tuple(words))
+    return Tied(matrix, followers, shares, tuple(words), tuple(repeats))
 
 
 def _shared(matrix: Sparse, changed: IntArray) -> Sparse:

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from ..case import Case
 from ..case.points import PointRef
 from ..contact.interface import Rows
+from ..contact.ties import Bond
 from ..typing import Array, IntArray, Sparse
 from .bodies import BuiltBody
 from .motion import Constraint, PrescribedMotion, columns
@@ -19,7 +20,8 @@ from .motion import Constraint, PrescribedMotion, columns
 class View:
     """Rows on all freedoms turned into rows on free freedoms and prescribed motions.
 
-    tie (N, N) csr gives all freedoms from the independent ones, None without ties.
+    tie (N, N) csr gives all freedoms from the independent ones, None without ties. repeats: the bonds of bodies that
+    repeat.
     """
 
     bodies: dict[str, BuiltBody]
@@ -28,6 +30,7 @@ class View:
     motion: PrescribedMotion
     constraints: list[Constraint]
     tie: Sparse | None = None
+    repeats: tuple[Bond, ...] = ()
 
     def rows(self, full: Sparse) -> Rows:
         """Rows (r, N) on all freedoms as rows on the free ones."""
