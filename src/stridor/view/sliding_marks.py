@@ -10,6 +10,8 @@ from ..typing import Array
 from .colours import GREY, INK
 from .interface_columns import seen_from_normal
 
+ROOM = 0.09  # of the height, for the names of the edges
+
 
 def mark_on_patch(ax: Axes, position: Array, tangents: Array, slip: Array) -> None:
     """Mark both edges of a contact in space, as `seen_from_normal` shows it in mm, with an arrow for the material of
@@ -49,3 +51,5 @@ def mark_on_line(ax: Axes, tangents: Array, slip: Array) -> None:
         arrow = "→" if direction[0] < 0 else "←"
         ax.text(x, 0.98, f"{arrow} {name}" if side == "left" else f"{name} {arrow}", transform=ax.transAxes, ha=side,
                 va="top", color=GREY, fontsize=8.5)  # fmt: skip
+    low, high = ax.get_ylim()
+    ax.set_ylim(low, high + ROOM * (high - low))  # an even pressure would run through them
