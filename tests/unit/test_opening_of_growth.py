@@ -333,7 +333,7 @@ def test_such_an_onset_has_no_slope_over_other_numbers(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("size", "ends", "again", "high", "one"),
     [(1e-2, 0.002, 0.006, 0.2, False), (1e-2, 0.002, 0.006, 0.2, True), (0.1, 0.001, 0.0019, 0.06, False),
-     (1.0, 0.0005, 0.0025, 0.1, True), (0.1, 0.001, 0.003, 0.1, False)],
+     *(pytest.param(*of, marks=pytest.mark.slow) for of in ((1.0, 5e-4, 0.0025, 0.1, True), (0.1, 1e-3, 3e-3, 0.1, False)))],
 )  # fmt: skip
 def test_growth_that_opens_ends_and_begins_again_in_the_first_step_is_solved_or_missed_aloud(
     size: float, ends: float, again: float, high: float, one: bool, tmp_path: Path

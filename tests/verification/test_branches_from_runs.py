@@ -105,7 +105,7 @@ def _stopped(speed: float, way: float) -> Callable[..., float]:
 POINTS = 40  # too few to lead round the fold
 
 
-@pytest.mark.parametrize("seed", [2, 3, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, *range(4, 11)))])
+@pytest.mark.parametrize("seed", [3, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2, *range(4, 11)))])
 def test_stick_slip_of_a_mass_is_followed_from_a_run(seed: int):
     mass = Mass.of(seed)
     found = mass.cycles()

@@ -219,7 +219,7 @@ def test_an_axis_that_is_not_walked_closely_is_noticed(tmp_path: Path, monkeypat
 
 
 # One comes into the band beside an onset, while others grow above it; growth that may be rounding beside an onset.
-@pytest.mark.parametrize("seed", [1568, 1934])
+@pytest.mark.parametrize("seed", [pytest.param(1568, marks=pytest.mark.slow), 1934])
 def test_the_truth_sees_each_onset_that_is_lost(seed: int, tmp_path: Path) -> None:
     problem = random_problem(seed)
     found = problem.solve(tmp_path)
