@@ -499,14 +499,16 @@ def test_phases_in_steps() -> None:
 
 
 def balance(error: float, records: int = 2) -> EnergyBalance:
-    return EnergyBalance(1, 2, 3, 4, 5, 6, 7, 8, error, np.zeros(records), circulatory=9.0)
+    return EnergyBalance(
+        1, 2, 3, 4, 5, 6, 7, 8, error, np.full(records, error), circulatory=9.0, turnover=1.0, vibration=0.5
+    )
 
 
 def test_the_energy_balance_in_words() -> None:
     assert balance(1e-6).closes
-    assert balance(1e-6).words(0.5) == "energy balance closes to 1.0e-06 of the energy turned over"
+    assert balance(1e-6).words(0.5) == "energy balance closes to 1.0e-06 of the energy turned over, 2.0e-06 of that of the vibration"
     assert not balance(1.01e-6).closes
-    missing = "energy balance does not close: 2.0e-02 of the energy turned over is missing"
+    missing = "energy balance does not close: 2.0e-02 of the energy turned over is missing, 4.0e-02 of that of the vibration"
     assert balance(2e-2).words(0.5) == missing
     assert balance(2e-2).words(0.6) == f"{missing}, the numerical damping of beta2 = 0.6 in it"
     assert balance(0.0, 1).words(0.5) == (

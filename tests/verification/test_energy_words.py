@@ -9,7 +9,7 @@ import pytest
 
 import stridor as st
 from solid_cases import BELT
-from stridor.temporal.energy import CLOSED, energy_balance
+from stridor.temporal.energy import CLOSED, VIBRATING, energy_balance
 
 pytestmark = pytest.mark.verification
 
@@ -47,3 +47,64 @@ def test_one_record_tells_nothing() -> None:
     assert not balance.checked
     assert not balance.closes
     assert balance.words(0.5).startswith("energy balance not checked, as there is one record")
+
+
+PRESSED = """units = "nondimensional"
+[bodies.m]
+type = "mass"
+mass = 1.0
+position = [0.0, 0.0]
+[bodies.belt]
+type = "obstacle"
+shape = "flat"
+point = [0.0, 0.0]
+normal = [0.0, 1.0]
+sliding = { velocity = [-1.0, 0.0] }
+[springs.k1]
+between = ["m", "ground"]
+direction = [1.0, 0.3]
+stiffness = 1.0
+[springs.k2]
+between = ["m", "ground"]
+direction = [0.2, 1.0]
+stiffness = 1.5
+[dashpots.a]
+between = ["m", "ground"]
+direction = [1.0, 0.0]
+damping = 0.05
+[loads.p]
+at = "m"
+force = [0.0, -1000.0]
+[contacts.c]
+slave = "m"
+master = "belt"
+stiffness = 4.0
+friction = { law = "coulomb", coefficient = 0.3 }
+[modal]
+max_frequency_hz = 1.0
+[temporal]
+initial = "steady-sliding"
+perturbation = 0.01
+watch = ["m"]
+[[phases]]
+name = "run"
+duration = 50.0
+"""
+
+
+@pytest.mark.parametrize("stepper", ["explicit", "exact", "implicit"])
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_a_preload_and_the_work_of_sliding_hide_no_broken_physics(mu: float, stepper: str) -> None:
+    """A vibration of 5e-5 J under a preload that stores 4e4 J, while sliding turns over 1e4 J."""
+    case = st.loads(PRESSED.replace("0.3 }", f"{mu} }}")).with_({"temporal.stepper": stepper})
+    run = st.simulate(case)
+    kept = energy_balance(run)
+    assert kept.closes
+    assert kept.error < CLOSED
+    assert kept.vibration_error is not None
+    assert kept.vibration_error < VIBRATING
+    undamped = {**run.works, "damping": 0.0 * run.works["damping"]}
+    for broken in (replace(run, kinetic=2 * run.kinetic), replace(run, kinetic=0 * run.kinetic), replace(run, works=undamped)):
+        balance = energy_balance(broken)
+        assert not balance.closes
+        assert balance.words(0.5).startswith("energy balance does not close: ")

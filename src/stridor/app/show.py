@@ -36,6 +36,10 @@ def show_run(summary: dict[str, Any]) -> None:
     if summary["path"] in ("exact", "implicit"):
         for said in summary["path_reason"].split("; ")[1:]:
             stdout.print(said)
+    else:
+        for said in summary["path_reason"].split("; "):
+            if said.startswith("steps of "):
+                stdout.print(said)
 
 
 _QUANTITIES = {

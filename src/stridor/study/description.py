@@ -22,6 +22,7 @@ from ..sliding import steady_nodes
 from ..sliding.surfaces import SurfaceSliding
 from ..system import System
 from ..temporal.inputs import unfit_in_time
+from ..temporal.settings import coarse
 from ..temporal.simulate import plan, step_of
 from .matrix_reports import matrix_reports
 from .pressed import unpressed_in_time
@@ -199,9 +200,11 @@ def _time_lines(case: Case, system: System, data: dict[str, Any]) -> list[str]:
         share = "which is that of the records alone"
     elif path == "implicit":
         share = f"{1.0 / (step * case.modal.max_frequency_hz):.3g} to the period of modal.max_frequency_hz"
+    few = coarse(step, settings, path)
     return [
         f"time step {step:.4g} s, {share}; {steps if steps < 1e12 else format(float(steps), '.3g')} steps",
         f"time loop: {path} path ({reason})",
+        *((few,) if few else ()),
     ]
 
 

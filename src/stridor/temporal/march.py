@@ -16,7 +16,7 @@ from .pace import Pace
 from .phase_results import PhaseResults
 from .restart import check_restart, joined, settings_row
 from .schedule import Schedule
-from .settings import Settings, unresolved
+from .settings import Settings, coarse, unresolved
 from .sketch import packed
 from .stepper import Stepper
 from .trajectory import Trajectory
@@ -50,6 +50,11 @@ class March:
         self.stepper.resume(restart, self.schedule, changed=changed)
         self.phases.resume(restart)
         self.restart, self.first_step = restart, restart.steps
+
+    def _told(self) -> tuple[str, str]:
+        """What to say of the step and of the records, each "" where nothing is."""
+        step = self.stepper.scheme.step
+        return coarse(step, self.settings, self.stepper.path), unresolved(step, self.settings)
 
     def run(self, progress: Progress | None, checkpoint: Checkpoint | None, every_seconds: float) -> Trajectory:
         """To the end, or to where it is stopped. Raises AnalysisError, with what was computed in its ``trajectory``."""
@@ -151,7 +156,7 @@ class March:
             steps=stepper.done,
             planned_steps=self.schedule.steps,
             path=stepper.path,
-            path_reason="; ".join(filter(None, (stepper.reason, unresolved(scheme.step, self.settings)))),
+            path_reason="; ".join(filter(None, (stepper.reason, *self._told()))),
             step_limit=stepper.limit.step,
             limiting_body=stepper.limit.body,
             most_sweeps=most_sweeps,

@@ -11,6 +11,10 @@ from ..errors import CaseError
 from ..system import System
 from .beta2 import StepLimit
 
+# Explicit steps to a period: central differences shift a frequency by (2π/n)²/24 of it, damping on the older velocity
+# by δΔt/4, and what modes are shifted by against each other is to be small beside what makes them flutter.
+FEWEST, ENOUGH = 40, 80
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -48,6 +52,25 @@ def unresolved(step: float, settings: Settings) -> str:
     enough = int(0.5 / (highest * step))
     mend = f"temporal.record_every = {enough} would" if enough else "no records of such steps do"
     return f"records every {between:.3g} s do not resolve {highest:g} Hz; {mend}"
+
+
+def coarse(step: float, settings: Settings, path: str) -> str:
+    """What to say of explicit steps [s] on a path that are few to the period of the highest frequency asked for, "" of
+    those that are enough."""
+    highest = settings.max_frequency_hz
+    if highest is None or path in ("exact", "implicit") or step * highest * FEWEST <= 1.0:
+        return ""
+    return (
+        f"steps of {step:.3g} s are {1.0 / (step * highest):.2g} to the period of modal.max_frequency_hz = {highest:g} "
+        "Hz: modes up there may come out at other frequencies and growth, or not grow at all (temporal.step = "
+        f"{_rounded_down(1.0 / (ENOUGH * highest)):g} takes {ENOUGH} or more, a lower max_frequency_hz needs fewer)"
+    )
+
+
+def _rounded_down(value: float) -> float:
+    """Two digits of it, not more than it is."""
+    unit = 10.0 ** (np.floor(np.log10(value)) - 1)
+    return float(f"{np.floor(value / unit * (1 + 1e-12)) * unit:.2g}")
 
 
 def not_finite(time: float, phase: str, step: float) -> str:

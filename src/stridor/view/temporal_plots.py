@@ -273,9 +273,8 @@ def energy_plot(trajectory: Trajectory, balance: EnergyBalance, *, axes: Sequenc
     above.set_ylabel("energy [mJ]")
     legend_above(above, columns=3)
     mark_phases(above, trajectory, named=False)
-    turnover = max(float(np.abs(values).max(initial=0.0)) for _, values, _, _ in curves) or 1.0
     if len(balance.history) == len(trajectory.time):
-        draw_history(below, trajectory.time, balance.history / turnover, colour=ORANGE)
+        draw_history(below, trajectory.time, balance.history / (balance.turnover or 1.0), colour=ORANGE)
     zero_line(below)
     below.set(xlabel="time [s]", ylabel="imbalance\n/ turnover")
     below.set_xlim(float(trajectory.time[0]), float(trajectory.time[-1]))

@@ -132,10 +132,15 @@ def energy_table(balance: EnergyBalance) -> Table:
     missing = sum(sign * value for _, value, sign in entries)
     rows.append(TableRow(("missing at the end", significant(1e3 * missing, 2)), "good" if balance.closes else "bad"))
     caption = (
-        f"Largest imbalance at any time: {significant(balance.error, 2)} of the largest energy that changed hands."
+        f"Largest imbalance at any time: {significant(balance.error, 2)} of the largest energy that changed hands"
         if balance.checked
-        else "Not checked: fewer than two records."
+        else "Not checked: fewer than two records"
     )
+    if balance.checked and balance.vibration_error is not None and (balance.told or not balance.closes):
+        caption += f", {significant(balance.vibration_error, 2)} of that of the vibration"
+    elif balance.checked and balance.vibration_error is not None:
+        caption += ", rounding, beside which the vibration has too little energy to be checked"
+    caption += "."
     return Table("energy", "Energy balance", ("", "energy [mJ]"), tuple(rows), frozenset({0}), caption)
 
 
