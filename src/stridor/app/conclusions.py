@@ -161,7 +161,9 @@ def of_run(summary: dict[str, Any], *, slides: bool = True) -> Conclusion:
     from ..temporal.signals import state_of
 
     if summary["dominant_frequency_hz"] is None:
-        said = "last phase: too few records for a dominant frequency, or nothing vibrates"
+        said = (
+            "last phase: too few records or periods (some six are needed) for a dominant frequency, or nothing vibrates"
+        )
         return Conclusion(said, "modes" if slides else "")
     rate, fit = summary["growth_rate"], summary["growth_fit"]
     state, growth = "not saturated", "nowhere exponential growth"

@@ -91,6 +91,7 @@ def modes(
     friction coefficients done and of all. A workspace keeps the modes, with vectors those at one μ. Raises CaseError
     for a bad μ, AnalysisError where the steady sliding state does not exist.
     """
+    require_friction(mu)
     require_frequency(max_frequency_hz)
     if count is not None:
         require_count(count, "count")
@@ -322,6 +323,8 @@ def simulate(
     work = Workspace.of(problem)
     marks: dict[str, Any] = {"restarts": []}
     if restart is not None:
+        if not isinstance(restart, Trajectory):
+            raise CaseError("restart", restart, "a run, of st.simulate or st.open(path)")
         now = check_restart(work.case("restart"), mu, restart, changed=changed)
         marks["restarts"] = [*restart.provenance.get("restarts", []), now]
     elif changed:

@@ -3,32 +3,42 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Mapping
+from numbers import Real
+from typing import Any, cast
 
 from ..errors import CaseError
 
 
 def require_friction(mus: float | Iterable[float] | None, where: str = "mu") -> None:
-    """Refuse friction coefficients that are negative or not finite. Raises CaseError."""
-    values = [] if mus is None else [mus] if isinstance(mus, float | int) else list(mus)
+    """Refuse friction coefficients that are none: negative, not finite, text. Raises CaseError."""
+    given: Any = mus
+    values: list[Any] = [] if given is None else [given]
+    if isinstance(given, Iterable) and not isinstance(given, str | Mapping):
+        values = list(cast("Iterable[Any]", given))
     for value in values:
-        if not 0.0 <= value < math.inf:
+        if not _is_number(value) or not 0.0 <= value < math.inf:
             raise CaseError(where, value, "a friction coefficient is a finite number ≥ 0")
 
 
 def require_band(band_hz: tuple[float, float] | None, top: float, where: str = "band_hz") -> None:
     """Refuse a band of frequencies [Hz] that is none, or beyond the highest that is looked at. Raises CaseError."""
-    if band_hz is not None and not 0.0 <= band_hz[0] < band_hz[1] <= top:
+    if band_hz is None:
+        return
+    given: Any = band_hz
+    given = tuple(given) if isinstance(given, Iterable) else given
+    pair = isinstance(given, tuple) and len(given) == 2 and all(map(_is_number, given))
+    if not pair or not 0.0 <= given[0] < given[1] <= top:
         raise CaseError(
-            where, "{:g}:{:g}".format(*band_hz), f"low:high in Hz, 0 ≤ low < high ≤ {top:g}, the highest frequency "
-            "looked at (--max-frequency, max_frequency_hz)",
+            where, "{:g}:{:g}".format(*given) if pair else given,
+            f"low:high in Hz, 0 ≤ low < high ≤ {top:g}, the highest frequency looked at (--max-frequency, "
+            "max_frequency_hz)",
         )  # fmt: skip
 
 
 def require_frequency(value: float | None, where: str = "max_frequency_hz") -> None:
     """Refuse a highest frequency that is not positive and finite. Raises CaseError."""
-    if value is not None and not 0.0 < value < math.inf:
+    if value is not None and (not _is_number(value) or not 0.0 < value < math.inf):
         raise CaseError(where, value, "a highest frequency is a finite number > 0 [Hz]")
 
 
@@ -68,3 +78,7 @@ def names_of(given: str | Iterable[str], where: str) -> tuple[str, ...]:
     if not all(isinstance(name, str) for name in names):
         raise CaseError(where, given, "a name, or a list of names")
     return names
+
+
+def _is_number(value: Any) -> bool:
+    return not isinstance(value, bool) and isinstance(value, Real)

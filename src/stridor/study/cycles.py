@@ -67,10 +67,9 @@ def cycles(
     where nothing slides, AnalysisError where steady sliding does not exist.
     """
     started = time.perf_counter()
+    require_friction(mu)
     work = Workspace.of(problem)
     values = [] if mu is None else [float(value) for value in np.ravel(np.asarray(mu, dtype=float))]
-    for value in values:
-        require_friction(value)
     pushes = None if push is None else [float(p) for p in np.ravel(np.asarray(push, dtype=float))]
     if pushes is not None and not (pushes and np.all(np.isfinite(pushes)) and np.all(pushes)):
         raise CaseError("push", push, "finite speeds above or below 0 [m/s]")

@@ -132,9 +132,14 @@ def summarise(problem: Problem, run: Trajectory) -> RunSummary:
     dominant, fitted = dominant_response(run, limit)
     linear: complex | None = None
     perturbed = work.temporal.initial == "steady-sliding" and work.temporal.perturbation > 0
-    if perturbed and len(run.time) >= LEAST_RECORDS and run.contact_names and run.nodes is None:
+    if perturbed and len(run.time) >= LEAST_RECORDS and run.contact_names and _of_points(work, run):
         system = work.system()
         steady = slip_speeds(system, full_motion(system))
         found = linear_part(run.slip_speed - steady, steady, skip=16)
         linear = components(found, run.sampling, max_frequency_hz=limit).fastest or None
     return RunSummary(dominant, fitted, energy_balance(run), run, linear)
+
+
+def _of_points(work: Workspace, run: Trajectory) -> bool:
+    """Whether every contact is of points, whose slip is that of the motion: over a surface it is a mean."""
+    return run.nodes is None or len(work.system().contacts) == len(run.contact_names)
