@@ -91,23 +91,23 @@ def test_one_name_may_stand_without_a_list() -> None:
 @pytest.mark.parametrize("verb", [st.modes, st.simulate, st.compare, st.cycles, st.steady_sliding])
 @pytest.mark.parametrize("value", ["", "0.5", {}, True, float])
 def test_friction_coefficients_of_another_kind(verb: Any, value: Any) -> None:
-    with pytest.raises(CaseError, match="^mu: .* – a friction coefficient is a finite number ≥ 0$"):
+    with pytest.raises(CaseError, match=r"^mu: .* – a friction coefficient is a finite number ≥ 0$"):
         verb(CASE, value)
 
 
 @pytest.mark.parametrize("band", ["", {}, "abc", (1.0,), ("1", "2"), 3.0])
 def test_bands_of_another_kind(band: Any) -> None:
-    with pytest.raises(CaseError, match="^band_hz: .* – low:high in Hz"):
+    with pytest.raises(CaseError, match=r"^band_hz: .* – low:high in Hz"):
         st.modes(CASE, 0.1, band_hz=band)
 
 
 def test_a_restart_takes_a_run_and_no_path() -> None:
     with pytest.raises(CaseError, match=r"^restart: 'run.nc' – a run, of st.simulate or st.open\(path\)$"):
         st.simulate(CASE, restart="run.nc")
-    with pytest.raises(CaseError, match="^max_frequency_hz: '' – a highest frequency is a finite number > 0"):
+    with pytest.raises(CaseError, match=r"^max_frequency_hz: '' – a highest frequency is a finite number > 0"):
         st.modes(CASE, 0.1, max_frequency_hz="")
 
 
 def test_a_ramp_from_steady_sliding_is_refused_before_anything_is_computed() -> None:
-    with pytest.raises(CaseError, match="^phases.0.ramp: 1e-05 – 0 when starting from steady sliding"):
+    with pytest.raises(CaseError, match=r"^phases\.0\.ramp: 1e-05 – 0 when starting from steady sliding"):
         loads(template_text("two-beams"), ['temporal.initial="steady-sliding"', "phases.0.ramp=1e-5"])
