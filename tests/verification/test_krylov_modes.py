@@ -46,6 +46,7 @@ class HandMade:
     name: str = "pad"
     sliding: str = "small"
     facets: None = None
+    joined: None = None
 
 
 def assembled(mass, damping, stiffness, normal, tangent, compliance, slip, *, law=None, loads=None, prestress=None):

@@ -346,9 +346,9 @@ class Linearised:
         missing = [number for number in choice if number not in where] if listed else [given]
         if missing:
             numbers = f"from 1 to {len(where)}" if where else "(the band has none)"
-            accepted = f"a list of numbers of branches {numbers}"
+            accepted = f"numbers of branches {numbers}"
             if not listed:
-                raise CaseError("modes", given, f'"unstable", "all" or {accepted}')
+                raise CaseError("modes", given, f'"unstable", "all" or a list of {accepted}')
             raise CaseError("modes", missing, accepted)
         return [where[number] for number in choice]
 
