@@ -60,7 +60,7 @@ def test_ranges_and_frequencies_that_are_none(tmp_path: Path):
     assert message(st.onsets, case, (0.5, 0.2)) == "friction_range: [0.5, 0.2] – two finite numbers 0 ≤ low < high"
     assert message(st.onsets, case, (-0.5, 0.2)) == "friction_range: [-0.5, 0.2] – two finite numbers 0 ≤ low < high"
     assert message(st.onsets, case, max_frequency_hz=-1.0) == "max_frequency_hz: -1.0 – a highest frequency is a finite number > 0 [Hz]"
-    assert message(st.modes, case, -0.1).startswith("mu: -0.1 – friction coefficients are numbers ≥ 0")
+    assert message(st.modes, case, -0.1).startswith("mu: -0.1 – a friction coefficient is a finite number ≥ 0")
     assert message(st.modes, case, 0.1, max_frequency_hz=-1.0) == "max_frequency_hz: -1.0 – a highest frequency is a finite number > 0 [Hz]"
 
 

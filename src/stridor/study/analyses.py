@@ -323,8 +323,9 @@ def simulate(
     work = Workspace.of(problem)
     marks: dict[str, Any] = {"restarts": []}
     if restart is not None:
-        if not isinstance(restart, Trajectory):
-            raise CaseError("restart", restart, "a run, of st.simulate or st.open(path)")
+        given: Any = restart
+        if not isinstance(given, Trajectory):
+            raise CaseError("restart", given, "a run, of st.simulate or st.open(path)")
         now = check_restart(work.case("restart"), mu, restart, changed=changed)
         marks["restarts"] = [*restart.provenance.get("restarts", []), now]
     elif changed:
