@@ -136,7 +136,7 @@ def test_a_slow_pair_that_grows_beside_a_free_body_has_its_onset_and_has_not_lef
 
 @pytest.mark.parametrize("skew", [0.0, 0.3])
 @pytest.mark.parametrize("slow", [(), (2e-6,), (3e-6, 1e-6)])
-@pytest.mark.parametrize("free", [0, 1, 3])
+@pytest.mark.parametrize("free", [0, 1, 3, 6])
 def test_of_large_matrices_free_motions_are_counted_too(free, slow, skew):
     count, rest = DENSE + 40, free + len(slow)
     chain = sp.diags_array([np.full(count - 1, -0.25), np.full(count, 0.5), np.full(count - 1, -0.25)], offsets=[-1, 0, 1])

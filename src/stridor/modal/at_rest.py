@@ -14,7 +14,6 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
-from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 
 from ..direct import SingularMatrix, factorise
 from ..errors import AnalysisError
@@ -28,6 +27,8 @@ LOST = 1e-15  # of the square of the highest frequency: what solving for all mod
 RESISTED = 1e-12  # of the stiffness, each freedom in its own units: less than that may be rounding
 ROUNDED = 1e-13  # of entries: what sums of them, and files of fourteen digits, leave
 SLOW = 1e-3  # of the highest frequency: what is faster is never taken for rest
+MORE = 4  # vectors of a block than are looked for
+STEPS, SETTLED = 40, 1e-4  # of inverse iteration at most; of the shift: ν that change by less are told from zero
 SHARE = 0.3  # of the highest frequency: at which mass counts as much as stiffness where that is zero
 
 
@@ -70,23 +71,28 @@ def slow_words(limit: float) -> str:
 
 def _free_of_large(problem: Quadratic, most: int, top: float, solver: str | None) -> int | None:
     """How many motions, up to ``most``, the stiffness does not resist beyond rounding: among those of the least ν of
-    K x = ν M x, by Arnoldi's method. None where they are not found."""
-    shift, count = (AT_REST * top) ** 2, min(most, problem.size - 3)
-    shifted = sp.csr_array(problem.stiffness + shift * problem.mass)
-    start = np.random.default_rng(20061).standard_normal(problem.size)
+    K x = ν M x, by inverse iteration of a block, which one vector's space need not have all of a multiple ν in. None
+    where they are not found."""
+    shift, size = (AT_REST * top) ** 2, min(most + MORE, problem.size)
+    stiffness, mass = sp.csr_array(problem.stiffness), sp.csr_array(problem.mass)
+    motions: Array = np.random.default_rng(20061).standard_normal((problem.size, size))
+    before = np.full(size, np.inf)
     try:
-        with factorise(shifted, solver=solver) as factor:
-
-            def turned(x: Array) -> Array:
-                return factor.solve(problem.mass @ np.ravel(x))
-
-            operator = LinearOperator(shifted.shape, matvec=turned, dtype=float)
-            values, vectors = eigs(operator, k=count, which="LM", v0=start)
-    except (AnalysisError, ArpackError):
+        with factorise(sp.csr_array(stiffness + shift * mass), solver=solver) as factor:
+            for _ in range(STEPS):
+                motions = np.linalg.qr(factor.solve(mass @ motions))[0]
+                values, turns = sl.eig(motions.T @ (stiffness @ motions), motions.T @ (mass @ motions))
+                order = np.argsort(np.abs(values))
+                values, turns = values[order], turns[:, order]
+                if np.abs(values - before)[:most].max() <= SETTLED * shift:
+                    break
+                before = values
+            else:
+                return None
+    except (AnalysisError, ValueError, np.linalg.LinAlgError):
         return None
-    squares = np.abs(1.0 / values - shift)
-    rounding = [_rounding(problem, np.abs(vectors[:, k : k + 1])) ** 2 for k in range(count)]
-    return int(np.count_nonzero(squares <= np.maximum(rounding, LOST * shift)))
+    rounding = [_rounding(problem, np.abs(motions @ turns[:, [k]])) ** 2 for k in range(min(most, size))]
+    return int(np.count_nonzero(np.abs(values[:most]) <= np.maximum(rounding, LOST * shift)))
 
 
 def double_zeros(values: ComplexArray) -> int:
