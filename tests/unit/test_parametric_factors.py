@@ -5,7 +5,17 @@ import json
 import numpy as np
 import pytest
 
-from stridor.modal.parametric.factors import CONSTANT, Formula, Lagrange, ParameterFactor, Product, factor_from_json
+from stridor.modal.parametric.factors import (
+    CONSTANT,
+    Axis,
+    Formula,
+    Lagrange,
+    ParameterFactor,
+    Product,
+    TabulatedFactor,
+    Together,
+    factor_from_json,
+)  # fmt: skip
 
 POINT = {"mu": 0.4, "k": 1.7, "Omega": 12.0}
 GRID = (0.0, 0.3, 0.8)
@@ -41,3 +51,13 @@ def test_points_of_a_polynomial_are_its_values() -> None:
 def test_what_is_no_factor_is_refused(document: dict[str, object]) -> None:
     with pytest.raises(ValueError, match="factor"):
         factor_from_json(document)
+
+
+def test_factors_asked_together_are_those_asked_one_by_one() -> None:
+    rng = np.random.default_rng(4)
+    mu, modulus = Axis("mu", (0.0, 0.1, 0.4)), Axis("modulus", (1e8, 1e9, 2e9, 1e10), logarithmic=True)
+    tables = [TabulatedFactor(axes, tuple(rng.standard_normal(np.prod([len(a.points) for a in axes])).tolist()))
+              for axes in [(mu,), (modulus, mu), (mu,), (modulus, mu), (mu, modulus)]]  # fmt: skip
+    factors = [Product((("mu", 1.0),)), *tables[:3], Lagrange((("mu", (0.0, 0.2), 1),)), *tables[3:]]
+    for point in ({"mu": 0.4, "modulus": 1e9}, {"mu": 0.123, "modulus": 3e8}):
+        np.testing.assert_allclose(Together(factors)(point), [f(point) for f in factors], rtol=1e-14)

@@ -34,7 +34,6 @@ MIXED = 0.1  # share of a mode in another by damping from which the two are not 
 MOVED = 0.5  # of the distance to the next mode: what answers may move one
 
 Matrices = tuple[Array, Array, Array]  # M, D, K (r, r)
-Images = tuple[ComplexArray, ComplexArray, ComplexArray]  # what they make of vectors (r, k)
 
 
 @dataclass(frozen=True)
@@ -133,8 +132,9 @@ class _Rough:
         self, matrices: Matrices, squares: ComplexArray, weight: ComplexArray, right: MostlyReal, left: MostlyReal,
         lam: ComplexArray, z: ComplexArray, w: ComplexArray, top: float,
     ) -> None:  # fmt: skip
-        mass, damping, stiffness = matrices
-        self.matrices, self.transposed = matrices, (mass.T, damping.T, stiffness.T)
+        damping = matrices[1]
+        self.matrices = matrices
+        self.stacked, self.transposed = np.stack(matrices), np.stack([matrix.T for matrix in matrices])
         self.squares, self.weight, self.right, self.left = squares[:, None], weight[:, None], right, left
         self.lam, self.z, self.w, self.top = lam, z, w, top
         distance = np.abs(lam**2 - self.squares)
@@ -148,13 +148,13 @@ class _Rough:
         """Let the others answer for the modes at these places (k,) until they settle or no more of them do; the
         places of those of them in the band that do not. (λ²M + K)⁻¹ is a sum over modes."""
         lam, z, w = self.lam, self.z, self.w
-        ours, theirs = _images(self.matrices, z[:, at]), _images(self.transposed, w[:, at])
+        ours, theirs = images(self.stacked, z[:, at]), images(self.transposed, w[:, at])
         number, watched = len(at) + 1, at
         for _ in range(ANSWERS):
             inverse = np.where(self.answering[:, at], 1.0 / ((lam[at] ** 2 - self.squares) * self.weight), 0.0)
             z[:, at] -= self.right.combined(inverse * self.left.weighed(_rest(lam[at], ours)))
             w[:, at] -= self.left.combined(inverse * self.right.weighed(_rest(lam[at], theirs)))
-            ours, theirs = _images(self.matrices, z[:, at]), _images(self.transposed, w[:, at])
+            ours, theirs = images(self.stacked, z[:, at]), images(self.transposed, w[:, at])
             lam[at] = _functional(lam[at], w[:, at], ours)
             unsettled = _unsettled(lam[at], w[:, at], ours, theirs)
             at = at[unsettled]
@@ -162,7 +162,7 @@ class _Rough:
             before, number = number, len(watched)
             if not number or number == before:
                 break
-            ours, theirs = (_chosen(images, unsettled) for images in (ours, theirs))
+            ours, theirs = (made[:, :, unsettled] for made in (ours, theirs))
         return watched
 
     def recombined(self, at: IntArray) -> bool:
@@ -171,7 +171,7 @@ class _Rough:
         mixed = np.flatnonzero(~self.answering[:, at].all(axis=1))
         among = np.union1d(at, np.flatnonzero(np.isin(self.own, mixed)))
         z, w = self.z[:, among], self.w[:, among]
-        mass, damping, stiffness = (w.T @ image for image in _images(self.matrices, z))
+        mass, damping, stiffness = (w.T @ image for image in images(self.stacked, z))
         try:
             lam, right, left = damped_pairs(mass, damping, stiffness, self.top, 2 * EDGE)
         except (ValueError, sl.LinAlgError):  # vectors that all but coincide span too little
@@ -196,7 +196,7 @@ class _Rough:
                 return False
             self.lam[k], self.z[:, k], self.w[:, k] = found.lam, found.right, found.left
         at = self._watched(at)
-        ours, theirs = _images(self.matrices, self.z[:, at]), _images(self.transposed, self.w[:, at])
+        ours, theirs = images(self.stacked, self.z[:, at]), images(self.transposed, self.w[:, at])
         return not _unsettled(self.lam[at], self.w[:, at], ours, theirs).any()
 
     def _watched(self, at: IntArray) -> IntArray:
@@ -229,27 +229,21 @@ def _coupling(damping: Array, right: MostlyReal, left: MostlyReal, count: int) -
     return norm
 
 
-def _unsettled(lam: ComplexArray, w: ComplexArray, ours: Images, theirs: Images) -> BoolArray:
+def _unsettled(lam: ComplexArray, w: ComplexArray, ours: ComplexArray, theirs: ComplexArray) -> BoolArray:
     """Of which modes (k,) what is left on both sides allows for an error above SMALL."""
-    right, left = (np.linalg.norm(_rest(lam, images), axis=0) for images in (ours, theirs))
+    right, left = (np.linalg.norm(_rest(lam, made), axis=0) for made in (ours, theirs))
     slope = np.einsum("ij,ij->j", w, 2 * lam * ours[0] + ours[1])
     unsettled: BoolArray = ~(right * left <= SMALL * np.abs(lam * slope))
     return unsettled
 
 
-def _images(matrices: Matrices, z: ComplexArray) -> Images:
-    """Mz, Dz and Kz (r, k)."""
-    mass, damping, stiffness = matrices
-    return combined(mass, z), combined(damping, z), combined(stiffness, z)
+def images(stacked: Array, z: ComplexArray) -> ComplexArray:
+    """Mz, Dz and Kz (3, s, k) of matrices (3, s, r) that lie one after the other, in one product."""
+    return np.asarray(combined(stacked.reshape(-1, stacked.shape[2]), z)).reshape(*stacked.shape[:2], -1)
 
 
-def _chosen(images: Images, columns: BoolArray) -> Images:
-    of_mass, of_damping, of_stiffness = (image[:, columns] for image in images)
-    return of_mass, of_damping, of_stiffness
-
-
-def _rest(lam: ComplexArray, images: Images) -> ComplexArray:
-    of_mass, of_damping, of_stiffness = images
+def _rest(lam: ComplexArray, made: ComplexArray) -> ComplexArray:
+    of_mass, of_damping, of_stiffness = made
     return lam**2 * of_mass + lam * of_damping + of_stiffness
 
 
@@ -260,9 +254,9 @@ def _alike(powers: bytes, kind: str) -> list[tuple[int, int]]:
     return list(pairwise([*starts, len(powers) // np.dtype(kind).itemsize]))
 
 
-def _functional(lam: ComplexArray, w: ComplexArray, images: Images) -> ComplexArray:
+def _functional(lam: ComplexArray, w: ComplexArray, made: ComplexArray) -> ComplexArray:
     """λ (k,) that makes wᵀP(λ)z zero, by Newton from the one before."""
-    a, b, c = (np.einsum("ij,ij->j", w, image) for image in images)
+    a, b, c = (np.einsum("ij,ij->j", w, image) for image in made)
     for _ in range(3):
         lam = lam - (a * lam**2 + b * lam + c) / (2 * a * lam + b)
     return lam
@@ -284,12 +278,13 @@ def made_of(projected: Array, factors: Array, powers: Array, lam: complex) -> Ar
 
 def assembled(projected: Array, factors: Array, powers: Array) -> Matrices:
     """M, D and K (r, s), or what else goes with each power of λ, from projected terms (t, r, s)."""
-    return assembled_each(projected, (factors,), powers)[0]
+    mass, damping, stiffness = assembled_each(projected, (factors,), powers)[0]
+    return mass, damping, stiffness
 
 
-def assembled_each(projected: Array, chosen: Sequence[Array], powers: Array) -> list[Matrices]:
-    """`assembled` with each of several factors (t,), in one pass through the terms, which are more than the cache
-    holds: those on one power of λ that follow one another together."""
+def assembled_each(projected: Array, chosen: Sequence[Array], powers: Array) -> Array:
+    """`assembled` (c, 3, r, s) with each of several factors (t,), in one pass through the terms, which are more than
+    the cache holds: those on one power of λ that follow one another together."""
     flat = projected.reshape(len(projected), -1)
     several = np.stack(chosen)
     total = np.zeros((len(several), 3, flat.shape[1]))
@@ -297,5 +292,4 @@ def assembled_each(projected: Array, chosen: Sequence[Array], powers: Array) -> 
         # A product of one row goes by BLAS's routine for vectors, which copies nothing.
         part = several[0, start:end] @ flat[start:end] if len(several) == 1 else several[:, start:end] @ flat[start:end]
         total[:, 2 - powers[start]] += part
-    total = total.reshape(-1, 3, *projected.shape[1:])
-    return [(mass, damping, stiffness) for mass, damping, stiffness in total]
+    return total.reshape(-1, 3, *projected.shape[1:])

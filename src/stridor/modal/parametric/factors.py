@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property, lru_cache
 from typing import Any, Protocol, TypeGuard, runtime_checkable
@@ -10,7 +10,7 @@ from typing import Any, Protocol, TypeGuard, runtime_checkable
 import numpy as np
 
 from ...case.expression import Expression, parse_expression
-from ...typing import Array
+from ...typing import Array, IntArray
 
 
 @runtime_checkable
@@ -247,19 +247,49 @@ class TabulatedFactor:
         )
 
     def _combined(self, weights: list[Array]) -> float:
-        table = self._table
+        table = self.table
         for own in weights:
             table = (own @ table.reshape(len(own), -1)).reshape(table.shape[1:])
         return float(table)
 
     @cached_property
-    def _table(self) -> Array:
+    def table(self) -> Array:
+        """Its values, with an index for each axis."""
         return np.array(self.values).reshape([len(axis.points) for axis in self.axes])
 
     def to_json(self) -> dict[str, Any]:
         """What `factor_from_json` makes the same factor of."""
         axes = [[axis.name, list(axis.points), axis.logarithmic] for axis in self.axes]
         return {"kind": "tabulated", "axes": axes, "values": list(self.values)}
+
+
+class Together:
+    """Factors (t,) of terms, asked at once: tables on the same axes, as the twenty of a contact's damping are, are gone
+    through as one."""
+
+    def __init__(self, factors: Sequence[Callable[[Mapping[str, float]], float]]) -> None:
+        alike: dict[tuple[Axis, ...], list[tuple[int, Array]]] = {}
+        for k, factor in enumerate(factors):
+            if isinstance(factor, TabulatedFactor):
+                alike.setdefault(factor.axes, []).append((k, factor.table))
+        self._tables: list[tuple[tuple[Axis, ...], IntArray, Array]] = [
+            (axes, np.array([k for k, _ in own]), np.stack([table for _, table in own])) for axes, own in alike.items()
+        ]
+        self._others = [(k, f) for k, f in enumerate(factors) if not isinstance(f, TabulatedFactor)]
+        self._count = len(factors)
+
+    def __call__(self, values: Mapping[str, float], /) -> Array:
+        found = np.empty(self._count)
+        for k, factor in self._others:
+            found[k] = factor(values)
+        for axes, at, tables in self._tables:
+            part = tables
+            for axis in axes:
+                part = (axis.weights(values[axis.name]) @ part.reshape(len(at), len(axis.points), -1)).reshape(
+                    len(at), *part.shape[2:]
+                )
+            found[at] = part
+        return found
 
 
 def factor_from_json(document: Mapping[str, Any]) -> ParameterFactor:

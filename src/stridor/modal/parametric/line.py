@@ -13,7 +13,7 @@ from ...errors import AnalysisError
 from ...typing import Array, ComplexArray, IntArray
 from ..dense_problem import Eigenpairs, OverNumber, combined
 from ..krylov.follow import Follower, State
-from .dense import assembled_each
+from .dense import assembled_each, images
 from .model import ReducedModel, ReducedModes
 
 TRIES = 16  # points of a line at most; what needs more is not told
@@ -87,7 +87,7 @@ class ModelAlongLine(OverNumber):
             return [np.array([f[powers == p] @ shares[powers == p] for p in (2, 1, 0)]) for f in chosen]
         left, right = modes.left, modes.right
         return [
-            np.array([np.einsum("ij,ij->j", left, combined(part, right)) for part in parts])
+            np.array([np.einsum("ij,ij->j", left, part) for part in images(parts, right)])
             for parts in assembled_each(self.model.projected, chosen, powers)
         ]
 

@@ -29,7 +29,7 @@ from ..dense_problem import combined
 from ..quadratic.problem import Quadratic
 from ..quadratic.reach import searched_in
 from ..tolerances import UNSTABLE_RELATIVE
-from .dense import DenseModes, assembled, dense_modes
+from .dense import DenseModes, assembled, assembled_each, dense_modes, images
 from .problem import ParametricProblem
 from .states import States
 
@@ -227,7 +227,7 @@ def sketched_rests(
     sketch: Array, factors: Array, powers: Array, lam: ComplexArray, z: ComplexArray
 ) -> ComplexArray:
     """Sketches (s, k) of scaled residuals of z (r, k): what acts on one power of λ at once."""
-    of_mass, of_damping, of_stiffness = (combined(matrix, z) for matrix in assembled(sketch, factors, powers))
+    of_mass, of_damping, of_stiffness = images(assembled_each(sketch, (factors,), powers)[0], z)
     total: ComplexArray = (of_mass * lam + of_damping) * lam + of_stiffness
     return total
 

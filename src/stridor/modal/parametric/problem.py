@@ -14,7 +14,7 @@ from ...case.points import choice
 from ...errors import CaseError
 from ...typing import Array, Sparse
 from ..quadratic.problem import Quadratic
-from .factors import is_data
+from .factors import Together, is_data
 
 Role = Literal["mass", "damping", "stiffness"]
 CORNERS = 3  # parameters up to which all corners of a box are looked at
@@ -108,7 +108,11 @@ class ParametricProblem:
 
     def factors(self, values: Mapping[str, float]) -> Array:
         """Factors (t,) of the terms."""
-        return np.array([t.factor(values) for t in self.terms], dtype=float)
+        return self._factors(values)
+
+    @cached_property
+    def _factors(self) -> Together:
+        return Together([t.factor for t in self.terms])
 
     def factor_slopes(self, values: Mapping[str, float], name: str) -> Array:
         """Derivatives (t,) of the factors over one parameter; of plain functions by differences within its range."""
