@@ -348,6 +348,30 @@ def test_files_cut_short_or_with_other_bytes(kind, files, tmp_path):
             assert open_results(path).identical(original)
 
 
+def test_no_damaged_byte_reaches_hdf5(files, tmp_path, monkeypatch):
+    """Of some, such as those that say how many dimensions a variable has, it makes a loop that not even Ctrl-C ends."""
+    content, path = files["modes"].read_bytes(), tmp_path / "modes.nc"
+    monkeypatch.setattr(h5py, "File", lambda *_, **__: pytest.fail("opened"))
+    for place in range(8, len(content) - 81, 997):
+        data = bytearray(content)
+        data[place] ^= 1
+        path.write_bytes(data)
+        assert "its bytes are not those that were written" in loaded(path)[1]
+
+
+def test_what_another_program_writes_again_is_taken_by_what_it_holds(files, tmp_path):
+    path, original = tmp_path / "modes.nc", open_results(files["modes"])
+    with h5py.File(files["modes"], "r") as file, h5py.File(path, "w") as copy:
+        for name in file.attrs:
+            copy.attrs[name] = file.attrs[name]
+        for name in file:
+            file.copy(name, copy)
+    assert path.read_bytes()[-81:] != files["modes"].read_bytes()[-81:]
+    cut = tmp_path / "cut.nc"
+    cut.write_bytes(files["modes"].read_bytes()[:-81])
+    assert open_results(cut).identical(original)
+
+
 def test_files_that_are_no_files(tmp_path):
     """Folders, pipes, sockets, devices, links in a circle: told at once, by every reader of results."""
     (tmp_path / "folder").mkdir()

@@ -30,7 +30,7 @@ from .atomic import replacing
 from .left_out import Keep
 from .reduced_models import load_reduced, save_reduced
 from .result_files import HDF5, damage_told, open_results
-from .seals import seal
+from .seals import bytes_end, seal
 from .streams import NotedErrors
 
 Result = (
@@ -93,6 +93,9 @@ def save(
                 dataset.to_netcdf(stream, engine="h5netcdf")
         finally:
             stream.finish()
+        end = bytes_end(temporary)
+        with temporary.open("ab") as file:
+            file.write(end)
     return target
 
 

@@ -14,7 +14,7 @@ from ..errors import CaseError
 from ..reading import bounded, irregular, largest_unfolded, size_words
 from ..tabular import FORMAT
 from .result_checks import check_results
-from .seals import CONTENTS, broken
+from .seals import CONTENTS, broken, bytes_changed
 
 _KIND = "stridor results "
 HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -30,6 +30,8 @@ def open_results(path: str | Path) -> Any:
     target = Path(path)
     _look_at(target)
     with damage_told(target), bounded():
+        if bytes_changed(target):
+            raise ValueError("its bytes are not those that were written")
         _check_sizes(target)
         loaded = _loaded(target)
         accept(loaded, target)

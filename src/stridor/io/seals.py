@@ -1,14 +1,52 @@
-"""The hash that a result file carries of everything in it, by which a changed or damaged one is told."""
+"""The hashes that a result file carries: of everything in it, by which a changed or damaged one is told, and at its end
+of its bytes, so that HDF5 never sees damaged ones: of a few it makes a loop that nothing ends."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 CONTENTS = "contents"  # the attribute: JSON, name of a variable → hash, "" → of all other attributes
+
+# What follows the bytes that HDF5 knows of is nothing to it, nor to other programs.
+_END = re.compile(rb"\nstridor sha256 ([0-9a-f]{64})\n")
+_ENDS_AT = {0: 40, 1: 44, 2: 28, 3: 28}  # where HDF5's first block, by its version, says how long the file is
+_PIECE = 2**20
+
+
+def bytes_end(path: Path) -> bytes:
+    """What is to follow the bytes of a file: their SHA-256."""
+    return b"\nstridor sha256 %s\n" % _bytes_digest(path, path.stat().st_size).encode()
+
+
+def bytes_changed(path: Path) -> bool:
+    """Whether something else than `bytes_end` of them follows the bytes of an HDF5 file, or some of these are missing.
+    Of a file that ends with them, as it is where another program has written it again, nothing is known."""
+    with path.open("rb") as stream:
+        head = stream.read(64)
+        at = _ENDS_AT.get(head[8]) if len(head) == 64 else None
+        if at is None:
+            return True
+        length = int.from_bytes(head[at : at + 8], "little")
+        if length == path.stat().st_size:
+            return False
+        stream.seek(min(length, path.stat().st_size))
+        end = _END.fullmatch(stream.read(100))
+    return end is None or end[1].decode() != _bytes_digest(path, length)
+
+
+def _bytes_digest(path: Path, length: int) -> str:
+    found = hashlib.sha256()
+    with path.open("rb") as stream:
+        while length > 0 and (piece := stream.read(min(length, _PIECE))):
+            found.update(piece)
+            length -= len(piece)
+    return found.hexdigest()
 
 
 def seal(dataset: Any) -> Any:
