@@ -11,6 +11,7 @@ from scipy.io import wavfile
 
 from ..case.points import choice
 from ..errors import AnalysisError, CaseError
+from ..notebook import Shown
 from ..study.ensemble_numbers import Observable, named_observable
 from ..temporal.trajectory import Trajectory
 from ..typing import Array
@@ -24,8 +25,8 @@ SHORTEST = 16  # records
 FAINT = 1e-3  # of the loudest: what is left in the range of hearing then is no more than the ends' own spectrum
 
 
-@dataclass(frozen=True)
-class Sound:
+@dataclass(frozen=True, repr=False)
+class Sound(Shown):
     """Samples (k,) from −1 to 1 at ``rate`` a second, of an observable [unit] that is ``loudest`` at most.
 
     slow: how many times slower, and lower, than it was. unheard: the share of its power above half the rate, which is
@@ -39,6 +40,10 @@ class Sound:
     loudest: float
     slow: float
     unheard: float
+
+    @property
+    def _line(self) -> str:
+        return self.sentence
 
     @property
     def seconds(self) -> float:
