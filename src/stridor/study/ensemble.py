@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..asking import FUNCTION, NUMBER, NUMBERS, SWITCH, TEXT, takes
 from ..errors import CaseError
 from ..modal.painleve import steps_undetermined
 from ..sliding import full_motion
@@ -34,6 +35,10 @@ Values = float | Sequence[float] | Array | None
 Sweep = Literal["up", "down", "both"]
 
 
+@takes(
+    mu=NUMBERS.or_none(), load=NUMBERS.or_none(), speed=NUMBERS.or_none(), perturbation=NUMBERS.or_none(),
+    grid=SWITCH, observable=TEXT.or_none(), window=NUMBER, modes=SWITCH, records=SWITCH, progress=FUNCTION,
+)  # fmt: skip
 def ensemble(
     problem: Problem,
     *,

@@ -9,11 +9,12 @@ import numpy as np
 from scipy import signal
 from scipy.io import wavfile
 
+from ..asking import NUMBER, TEXT, WHOLE, takes
 from ..case.points import choice
 from ..errors import AnalysisError, CaseError
 from ..notebook import Shown
 from ..study.ensemble_numbers import Observable, named_observable
-from ..temporal.trajectory import Trajectory
+from ..temporal.trajectory import RUN, Trajectory
 from ..typing import Array
 
 RATE = 44100  # samples a second
@@ -65,6 +66,7 @@ class Sound(Shown):
         return buffer.getvalue()
 
 
+@takes(run=RUN, observable=TEXT.or_none(), slow=NUMBER, phase=TEXT.or_none(), repeat=WHOLE)
 def sound(
     run: Trajectory, observable: str | None = None, *, slow: float = 1.0, phase: str | None = None, repeat: int = 1
 ) -> Sound:
