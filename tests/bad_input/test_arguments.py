@@ -173,3 +173,9 @@ def test_numbers_and_switches_of_numpy_are_taken() -> None:
     found = st.modes(CASE, np.array([0.1]), damped=np.bool_(True), check=np.bool_(True))
     assert np.array_equal(found.eigenvalues, plain.eigenvalues)
     assert np.array_equal(st.modes(CASE, np.array(0.1)).eigenvalues, plain.eigenvalues)
+
+
+def test_an_observable_that_is_none_is_told_before_its_window_and_names_are_said_once() -> None:
+    told = r"^observable: 'X' – POINT.QUANTITY .* with a contact among rub and slip_speed"
+    with pytest.raises(CaseError, match=told):
+        st.ensemble(CASE, mu=[0.1, 0.2], observable="X", window=1e-6)

@@ -92,8 +92,8 @@ def ensemble(
         settings = replace(settings, initial=initial)
     if speed is not None and not np.any(system.motion.full):
         raise CaseError("speed", None, "no support of the case moves with a prescribed velocity, so none can be scaled")
-    _check_window(work, system, settings, window)
     looked_at = observable_of(observable, system, settings)
+    _check_window(work, system, settings, window)
     watch = settings.watch if records else (looked_at.owner,) if looked_at.of_point else ()
     seen = _Seen(looked_at, work.modal.max_frequency_hz, plan, records)
     outcome = march_all(
