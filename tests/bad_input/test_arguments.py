@@ -111,3 +111,71 @@ def test_a_restart_takes_a_run_and_no_path() -> None:
 def test_a_ramp_from_steady_sliding_is_refused_before_anything_is_computed() -> None:
     with pytest.raises(CaseError, match=r"^phases\.0\.ramp: 1e-05 – 0 when starting from steady sliding"):
         loads(template_text("two-beams"), ['temporal.initial="steady-sliding"', "phases.0.ramp=1e-5"])
+
+
+RUN = st.simulate(CASE.with_({"phases": [{"name": "a", "duration": 1.0}]}))
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: st.load("case.toml", None), "overrides: missing – a list of texts path=value"),
+        (lambda: st.loads(None), "text: missing – a text"),
+        (lambda: CASE.with_("abc"), "changes: 'abc' – a table of values by their paths"),
+        (lambda: CASE.with_({1: 2}), "override: 1 – write an override as path=value"),
+        (lambda: st.perturbed_copies(CASE, RUN, count=None), "count: missing – a whole number"),
+        (lambda: st.perturbed_copies(CASE, None), "run: missing – a run, of st.simulate or st.open(path)"),
+        (lambda: st.perturbed_copies(CASE, RUN, [0.1]), "mu: [0.1] – a friction coefficient is a finite number ≥ 0"),
+        (lambda: st.perturbed_copies(CASE, RUN, seed=-1), "seed: -1 – a whole number ≥ 0"),
+        (lambda: st.sound(None), "run: missing – a run, of st.simulate or st.open(path)"),
+        (lambda: st.sound(RUN, slow="abc"), "slow: 'abc' – a number"),
+        (lambda: st.summarise(CASE, []), "run: [] – a run, of st.simulate or st.open(path)"),
+        (lambda: st.open(None), "path: missing – a path"),
+        (lambda: st.open_study(-1), "path: -1 – a path"),
+        (lambda: st.save(RUN, []), "path: [] – a path"),
+        (lambda: st.export(CASE, None), "folder: missing – a path"),
+        (lambda: st.run_study(None), "study: 'a NoneType' – a study, or the path of its file"),
+        (lambda: st.study_figures(RUN), "result: 'a Trajectory' – a study's result"),
+        (lambda: st.modes(CASE, damped="abc"), "damped: 'abc' – True or False, or None"),
+        (lambda: st.modes(CASE, progress=-1), "progress: -1 – a function, or None"),
+        (lambda: st.onsets(CASE, check=None), "check: missing – True or False"),
+        (lambda: st.pencil(CASE, [0.1]), "mu: [0.1] – a friction coefficient is a finite number ≥ 0"),
+        (lambda: st.simulate(CASE, []), "mu: [] – a friction coefficient is a finite number ≥ 0"),
+        (lambda: st.simulate(CASE, checkpoint="abc"), "checkpoint: 'abc' – a function, or None"),
+        (lambda: st.sensitivities(CASE, mu="abc"), "mu: 'abc' – a friction coefficient is a finite number ≥ 0"),
+        (lambda: st.sensitivities(CASE, steps=3.0), "steps: 3.0 – a table, or None"),
+        (lambda: st.rank_countermeasures(CASE, margin="abc"), "margin: 'abc' – a number"),
+        (lambda: st.cycles(CASE, between="abc"), "between: 'abc' – two numbers, or None"),
+        (lambda: st.cycles(CASE, 0.5, points=None), "points: missing – a number"),
+        (lambda: st.damping_map(CASE, None, "y", x_range=(0, 1), y_range=(0, 1)), "x: missing – a text"),
+        (lambda: st.ensemble(CASE, mu="abc"), "mu: 'abc' – a number, or a list of at least one"),
+        (lambda: st.reduced_model(CASE, "abc"), "box: 'abc' – a table"),
+        (lambda: st.compare(CASE, 0.5, kept=3), "kept: 3 – a store of finished parts"),
+        (lambda: st.body_modes(CASE, max_frequency_hz=-1), "max_frequency_hz: -1 – a highest frequency"),
+    ],
+)
+def test_what_is_of_another_kind_altogether_is_refused_by_its_name(call: Callable[[], Any], said: str) -> None:
+    with pytest.raises(st.CaseError) as raised:
+        call()
+    assert str(raised.value).startswith(said)
+
+
+@pytest.mark.parametrize("verb", [st.modes, st.compare, st.cycles])
+def test_an_empty_list_of_friction_coefficients_is_none(verb: Any) -> None:
+    with pytest.raises(CaseError, match=r"^mu: \[\] – at least one friction coefficient, or None$"):
+        verb(CASE, [])
+
+
+def test_numbers_and_switches_of_numpy_are_taken() -> None:
+    import numpy as np
+
+    plain = st.modes(CASE, [0.1], damped=True)
+    found = st.modes(CASE, np.array([0.1]), damped=np.bool_(True), check=np.bool_(True))
+    assert np.array_equal(found.eigenvalues, plain.eigenvalues)
+    assert np.array_equal(st.modes(CASE, np.array(0.1)).eigenvalues, plain.eigenvalues)
+
+
+def test_an_observable_that_is_none_is_told_before_its_window_and_names_are_said_once() -> None:
+    told = r"^observable: 'X' – POINT.QUANTITY .* with a contact among rub and slip_speed"
+    with pytest.raises(CaseError, match=told):
+        st.ensemble(CASE, mu=[0.1, 0.2], observable="X", window=1e-6)

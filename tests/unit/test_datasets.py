@@ -11,6 +11,7 @@ import stridor as st
 from stridor.io.atomic import replacing, write_text
 from stridor.io.datasets import load_trajectory
 from stridor.io.result_files import open_results
+from stridor.temporal.trajectory import HISTORIES
 
 
 @pytest.fixture(scope="module")
@@ -105,6 +106,8 @@ def test_trajectory_round_trip_is_exact(case: st.Case, tmp_path: Path) -> None:
     back = st.open(st.save(run, tmp_path / "run.nc"))
     for name in ("time", "normal_force", "status", "velocity", "kinetic"):
         assert np.array_equal(getattr(back, name), getattr(run, name)), name
+    for name in HISTORIES:
+        assert getattr(back, name).dtype == getattr(run, name).dtype, name
     assert back.phases == run.phases
     assert back.step == run.step
     assert all(np.array_equal(back.state[k], run.state[k]) for k in run.state)

@@ -69,6 +69,13 @@ def test_pitch_length_and_level(run: Trajectory, slow: float) -> None:
     assert abs(samples.mean()) < 30
 
 
+def test_it_is_shown_in_a_line(run: Trajectory) -> None:
+    found = st.sound(ringing(run), slow=10)
+    assert repr(found) == f"<Sound: {found.sentence}>"
+    assert "10 times slower and lower" in repr(found)
+    assert found._repr_html_() == f"<div><strong>Sound: {found.sentence}</strong></div>"
+
+
 def test_what_nobody_hears_is_said_and_left_out(run: Trajectory) -> None:
     found = st.sound(ringing(run, above=3e3))
     assert heard(found)[2] == pytest.approx(PITCH, rel=2e-3)

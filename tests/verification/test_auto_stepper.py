@@ -90,3 +90,34 @@ def test_a_cutoff_that_the_phases_keep_from_acting_is_told():
     lines = without_effect(uneven, "simulate")
     assert any("comes to explicit steps here (exact steps do not begin so: phases are no multiples" in line for line in lines)
     assert st.simulate(uneven).path != "exact"
+
+
+@pytest.mark.parametrize("stepper", ["explicit", "exact", "implicit", "auto"])
+def test_no_stepper_makes_a_phase_longer(stepper: Any):
+    """A phase of 0.4 steps was lengthened to one by explicit ones."""
+    settings = replace(AUTO, stepper=stepper)
+    with pytest.raises(st.CaseError, match=r"temporal.step: 0.01 – .*p0 of 0.004 s would take 0.01 s; give another") as met:
+        simulate(block(), phases(0.004, 1.0), settings)
+    assert ("no longer than any phase" in str(met.value)) == (stepper in ("explicit", "auto"))
+    assert simulate(block(), phases(0.01, 0.02), settings).steps == 3
+
+
+def test_a_system_alone_is_not_run_longer_than_its_phase():
+    """Its 0.01 s are less than one of its own steps; that is said, and a run of phases given takes their time."""
+    slow = block()
+    with pytest.raises(st.CaseError, match=r"a step no longer than any phase: run of 0.01 s would take 0.0786 s"):
+        st.simulate(slow)
+    result = st.simulate(st.Workspace(slow, phases=[{"name": "run", "duration": 0.786}]))
+    assert result.phases[0].end == pytest.approx(0.786, rel=1e-3)
+    phases = [{"name": "press", "duration": 0.01}, {"name": "run", "duration": 80.0}]
+    brief = st.Workspace(slow, phases=phases, temporal={"record_every": 1})
+    with pytest.raises(st.CaseError, match=r"no longer than any phase: press of 0.01 s"):
+        st.ensemble(brief, mu=[0.1, 0.2])
+
+
+def test_check_says_which_phases_a_run_refuses():
+    case = mode_coupling(0.1, 0.1)
+    assert not [line for line in st.describe(case).lines if "refuses these phases" in line]
+    step = st.describe(case).data["step"]
+    short = case.with_({"phases": [{"name": "brief", "duration": 0.3 * step}]})
+    assert any("refuses these phases" in line and "brief of" in line for line in st.describe(short).lines)

@@ -539,6 +539,7 @@ def test_a_run_that_is_cut_goes_on_to_the_last_digit(monkeypatch: pytest.MonkeyP
     again = st.simulate(case, restart=saved)
     for name in ("time", "normal_force", "displacement", "acceleration", "status", "kinetic"):
         assert np.array_equal(getattr(again, name), getattr(whole, name)), name
+    assert np.array_equal(again.state["implicit_counters"], whole.state["implicit_counters"])
     changed = st.simulate(case.with_({"contacts.A.friction.coefficient": 0.2}), restart=saved, changed=True)
     assert energy_balance(changed).error < 1e-6
     assert np.abs(changed.displacement[len(part.time)] - whole.displacement[len(part.time)]).max() < 1e-9

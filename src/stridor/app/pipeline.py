@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..agreement import PartStore, dominant_response, last_rate, modal_assurance, settled
+from ..asking import FUNCTION, PATH, STORE, SWITCH, takes
 from ..digits import measured
 from ..errors import CaseError, StridorError
 from ..io.atomic import write_text
@@ -104,6 +105,7 @@ class Outcome(Shown):
         }
 
 
+@takes(folder=PATH.or_none(), progress=FUNCTION, log=FUNCTION, fresh=SWITCH, kept=STORE)
 def run(
     problem: Problem,
     folder: str | Path | None = None,
@@ -128,6 +130,7 @@ def run(
     return _run(work, _folder(problem, folder), parts, progress=progress, log=log, fresh=fresh, kept=kept)
 
 
+@takes(folder=PATH.or_none(), log=FUNCTION, fresh=SWITCH, kept=STORE)
 def report(
     problem: Problem,
     folder: str | Path | None = None,
@@ -146,7 +149,7 @@ def report(
     a model has nothing to show for (shapes without coordinates of nodes) is left out, and the notes say so.
     """
     work = Workspace.of(problem)
-    require_friction(mu)
+    require_friction(mu, several=False)
     parts = chosen_parts(None, skip, OF_REPORT)
     return _run(work, _folder(problem, folder), parts, mu=mu, log=log, fresh=fresh, kept=kept)
 

@@ -148,6 +148,10 @@ class Case(Shown, Table):
         case.with_({"contacts.A.friction.coefficient": 0.3}), case.with_(title="lower friction"). An item of a
         list is reached by its number from 0 or its name ("phases.slide.duration"). Raises CaseError.
         """
+        given: Any = changes
+        if given is not None and not isinstance(given, Mapping):
+            how = 'a table of values by their paths, such as {"contacts.A.friction.coefficient": 0.3}'
+            raise CaseError("changes", given if isinstance(given, str | float | int) else kind_of(given), how)
         data = self._data()
         problems: list[Problem] = []
         for path, value in {**(changes or {}), **more}.items():

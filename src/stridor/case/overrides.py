@@ -47,6 +47,9 @@ def parse_override(text: str) -> tuple[str, object]:
 
 def split_path(path: str) -> tuple[str, ...]:
     """Keys of a dotted path. Raises CaseError where one of them is empty."""
+    given: Any = path
+    if not isinstance(given, str):
+        raise CaseError("override", given, _HOW)
     steps = tuple(step.strip() for step in path.split("."))
     if not all(steps) or len(steps) > _DEEPEST:
         raise CaseError("override", path, _HOW)

@@ -11,6 +11,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..asking import OVERRIDES, PATH, TEXT, takes
 from ..errors import CaseError, kind_of
 from ..reading import irregular
 from .outsized import deep_line
@@ -23,6 +24,7 @@ _POSITION = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)\
 _KEYS = re.compile(r"\('[^)]*',?\)")  # how tomllib names a table
 
 
+@takes(overrides=OVERRIDES)
 def load(path: str | PathLike[str], overrides: Sequence[str] = ()) -> Case:
     """The case in a TOML file, with overrides such as "phases.1.duration=0.01" applied. Raises CaseError."""
     if not isinstance(path, str | PathLike):  # pyright: ignore[reportUnnecessaryIsInstance]
@@ -48,6 +50,7 @@ def load(path: str | PathLike[str], overrides: Sequence[str] = ()) -> Case:
     return loads(text, overrides, source, folder=Path(path).resolve().parent)
 
 
+@takes(text=TEXT, overrides=OVERRIDES, source=TEXT, folder=PATH.or_none())
 def loads(
     text: str, overrides: Sequence[str] = (), source: str = "<text>", *, folder: Path | None = None
 ) -> Case:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..agreement import Agreement
+from ..asking import PATH, takes
 from ..case import Case
 from ..errors import CaseError, kind_of
 from ..modal.complex_modes import ComplexModes
@@ -59,6 +60,7 @@ def to_dataset(result: Result) -> Any:
     raise CaseError("result", kind_of(result), accepted)
 
 
+@takes(path=PATH)
 def save(
     result: Result | ReducedModel,
     path: str | Path,
@@ -115,6 +117,7 @@ def _no_cluster() -> Generator[None]:
             modules.pop(CLUSTER, None)
 
 
+@takes(path=PATH)
 def open(path: str | Path) -> Any:
     """What is in a file that `save` or a command wrote, by its content: a Trajectory with the state that a restart
     needs, a ReducedModel whose modes are the same to the last bit, a Boundary, a DampingMap, Countermeasures, Cycles,

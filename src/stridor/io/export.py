@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..asking import PATH, SWITCH, takes
 from ..case import loads
 from ..errors import CaseError
 from ..notebook import Shown, html_table
@@ -81,6 +82,7 @@ class Export(Shown):
         }
 
 
+@takes(folder=PATH, force=SWITCH)
 def export(
     problem: Problem, folder: str | Path, *, format: str = "mtx", mu: float | None = None, force: bool = False
 ) -> Export:

@@ -10,6 +10,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..asking import instance, takes
 from ..errors import AnalysisError
 from ..typing import Array
 from ..view.colours import BLUE, GREY, INK, ORANGE, VERMILION
@@ -168,6 +169,7 @@ def band_probability(result: StudyResult, edges: Sequence[float] | None = None, 
     return figure
 
 
+@takes(result=instance(StudyResult, "a study's result, of st.run_study or st.open_study(path)"))
 def study_figures(result: StudyResult) -> dict[str, Figure]:
     """Every figure that a study has something for, by the name of its file."""
     drawn: dict[str, Figure] = {}

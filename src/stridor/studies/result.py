@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..asking import PATH, SWITCH, takes
 from ..errors import AnalysisError, CaseError
 from ..notebook import Shown, counted, html_table
 from ..tabular import Cell, Rows, Tabular
@@ -277,6 +278,7 @@ def _cell(value: Any) -> Cell:
     return None if isinstance(value, float) and not np.isfinite(value) else value
 
 
+@takes(path=PATH, interrupted=SWITCH)
 def open_study(path: str | Path, *, interrupted: bool = False) -> StudyResult:
     """The store of a study, or the folder that it lies in. Raises CaseError where there is none or it is damaged."""
     location = Path(path)

@@ -14,9 +14,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from ..asking import FUNCTION, PATH, SWITCH, TEXT, WHOLE, takes
 from ..case import Case
 from ..case.units import unit_at
-from ..errors import AnalysisError, CaseError
+from ..errors import AnalysisError, CaseError, kind_of
 from ..interrupts import held
 from ..io.claims import claimed
 from ..notebook import counted
@@ -59,6 +60,10 @@ class Workers(Protocol):
     def answers(self, batches: Iterator[SampleBatch]) -> Iterator[dict[int, Row]]: ...
 
 
+@takes(
+    folder=PATH.or_none(), workers=WHOLE.or_none(), scheduler=TEXT.or_none(), go_on=SWITCH, progress=FUNCTION,
+    say=FUNCTION,
+)  # fmt: skip
 def run_study(
     study: Study | str | PathLike[str],
     folder: str | Path | None = None,
@@ -82,6 +87,8 @@ def run_study(
     AnalysisError where the store cannot be written, a scheduler does not answer or a worker has another stridor.
     """
     if not isinstance(study, Study):
+        if not isinstance(study, str | PathLike):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise CaseError("study", kind_of(study), "a study, or the path of its file")
         folder = Path(study).with_suffix(".out") if folder is None else folder
         study = Study.load(study)
     if folder is None:

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..agreement import Agreement, Comparison, PartStore
 from ..agreement import compare as compare_system
+from ..asking import FUNCTION, NUMBER, NUMBERS, SWITCH, SWITCH_OR_NONE, takes
 from ..case.matrix_checks import MU
 from ..errors import AnalysisError, CaseError
 from ..errors import Problem as Wrong
@@ -68,6 +69,7 @@ __all__ = [
 MOST_BYTES = 8e9  # of records kept in memory
 
 
+@takes(damped=SWITCH_OR_NONE, check=SWITCH, residuals=SWITCH, progress=FUNCTION)
 def modes(
     problem: Problem,
     mu: float | Sequence[float] | Array | None = None,
@@ -199,7 +201,7 @@ def steady_sliding(problem: Problem, mu: float | None = None) -> SurfaceSliding:
     mu replaces the friction coefficient of every contact that has friction. Where more than one set of a few contact
     nodes is in equilibrium, a warning names the others. Raises AnalysisError where there is none.
     """
-    require_friction(mu)
+    require_friction(mu, several=False)
     work = Workspace.of(problem)
     found, system = work.steady(mu), work.system(mu)
     nodes = system.contact_nodes()
@@ -237,6 +239,7 @@ def onsets(
     along: str,
     max_frequency_hz: float | None = None,
 ) -> ParametricOnsets: ...
+@takes(damped=SWITCH_OR_NONE, check=SWITCH)
 def onsets(
     problem: Problem,
     friction_range: tuple[float, float] | None = None,
@@ -300,6 +303,7 @@ def found_onsets(
     return replace(result, notes=(*result.notes, *notes, *work.one_for_all))
 
 
+@takes(progress=FUNCTION, checkpoint=FUNCTION, checkpoint_seconds=NUMBER, changed=SWITCH)
 def simulate(
     problem: Problem,
     mu: float | None = None,
@@ -319,7 +323,7 @@ def simulate(
     phases of its workspace, and without one for 0.01 s under all its loads.
     """
     started = time.perf_counter()
-    require_friction(mu)
+    require_friction(mu, several=False)
     work = Workspace.of(problem)
     marks: dict[str, Any] = {"restarts": []}
     if restart is not None:
@@ -446,6 +450,7 @@ def compare(
     return replace(result, notes=tuple(notes), provenance=provenance(work, "compare", seconds, mu=chosen))
 
 
+@takes(frequency_hz=NUMBERS)
 def friction_curve(problem: Problem, frequency_hz: Array) -> Array:
     """Undamped μ(ω) (k,) of a single contact with constant μ, at frequencies (k,) [Hz].
 

@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from numbers import Real
 from typing import Any, cast
 
+from ..asking import is_number
 from ..errors import CaseError
 
 
-def require_friction(mus: float | Iterable[float] | None, where: str = "mu") -> None:
-    """Refuse friction coefficients that are none: negative, not finite, text. Raises CaseError."""
+def require_friction(mus: float | Iterable[float] | None, where: str = "mu", *, several: bool = True) -> None:
+    """Refuse friction coefficients that are none: negative, not finite, text, an empty list, a list where ``several``
+    is false. Raises CaseError."""
     given: Any = mus
     values: list[Any] = [] if given is None else [given]
-    if isinstance(given, Iterable) and not isinstance(given, str | Mapping):
-        values = list(cast("Iterable[Any]", given))
+    if isinstance(given, Iterable) and not isinstance(given, str | Mapping) and getattr(given, "ndim", 1):
+        values = list(cast("Iterable[Any]", given)) if several else [given]
+        if not values:
+            raise CaseError(where, given, "at least one friction coefficient, or None")
     for value in values:
-        if not _is_number(value) or not 0.0 <= value < math.inf:
+        value = value.item() if getattr(value, "ndim", None) == 0 else value  # an array of one number is one
+        if not is_number(value) or not 0.0 <= value < math.inf:
             raise CaseError(where, value, "a friction coefficient is a finite number ≥ 0")
 
 
@@ -27,7 +31,7 @@ def require_band(band_hz: tuple[float, float] | None, top: float, where: str = "
         return
     given: Any = band_hz
     given = tuple(given) if isinstance(given, Iterable) else given
-    pair = isinstance(given, tuple) and len(given) == 2 and all(map(_is_number, given))
+    pair = isinstance(given, tuple) and len(given) == 2 and all(map(is_number, given))
     if not pair or not 0.0 <= given[0] < given[1] <= top:
         raise CaseError(
             where, "{:g}:{:g}".format(*given) if pair else given,
@@ -38,7 +42,7 @@ def require_band(band_hz: tuple[float, float] | None, top: float, where: str = "
 
 def require_frequency(value: float | None, where: str = "max_frequency_hz") -> None:
     """Refuse a highest frequency that is not positive and finite. Raises CaseError."""
-    if value is not None and (not _is_number(value) or not 0.0 < value < math.inf):
+    if value is not None and (not is_number(value) or not 0.0 < value < math.inf):
         raise CaseError(where, value, "a highest frequency is a finite number > 0 [Hz]")
 
 
@@ -78,7 +82,3 @@ def names_of(given: str | Iterable[str], where: str) -> tuple[str, ...]:
     if not all(isinstance(name, str) for name in names):
         raise CaseError(where, given, "a name, or a list of names")
     return names
-
-
-def _is_number(value: Any) -> bool:
-    return not isinstance(value, bool) and isinstance(value, Real)

@@ -18,6 +18,7 @@ from ..system import System
 from ..system.model import Line, Solid
 from ..tabular import Rows, Tabular
 from ..typing import Array, Sparse
+from .asked import require_frequency
 from .workspace import Problem, Workspace
 
 DENSE = 1500  # freedoms up to which all modes are computed
@@ -53,6 +54,7 @@ def body_modes(problem: Problem, *, max_frequency_hz: float | None = None) -> Ma
 
     All other bodies are held. Of a large body there are up to the 40 lowest; point masses have none.
     """
+    require_frequency(max_frequency_hz)
     work = Workspace.of(problem)
     limit = max_frequency_hz or work.modal.max_frequency_hz
     return work.answers.once(("body modes", limit), lambda: _of_bodies(work.system(), limit))

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ..asking import FUNCTION, NUMBER, TEXT, WHOLE, takes
 from ..case.matrix_checks import MU
 from ..errors import CaseError
 from ..modal.boundary import Found, StabilityCurve, boundaries
@@ -31,6 +32,9 @@ from .workspace import Problem, Workspace
 BESIDE = 1e-4  # of the ranges: how far beside a curve the others are counted
 
 
+@takes(
+    x=TEXT, y=TEXT, max_frequency_hz=NUMBER.or_none(), bound=NUMBER, tolerance=NUMBER, lines=WHOLE, progress=FUNCTION
+)
 @one_thread
 def stability_boundary(
     problem: Problem,

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..agreement import Agreement, Comparison, PartStore
 from ..agreement.four_answers import four_answers, with_answers
+from ..asking import FUNCTION, STORE, SWITCH, SWITCH_OR_NONE, TABLE, takes
 from ..errors import CaseError, StridorError
 from ..periodic import Cycle, CycleOnset
 from ..temporal.trajectory import Trajectory
@@ -19,6 +20,9 @@ from .settings import phases_of, settings_of
 from .workspace import Problem, Workspace
 
 
+@takes(
+    cycles=SWITCH, critical=SWITCH_OR_NONE, runs=TABLE.or_none(), progress=FUNCTION, kept=STORE, finished=FUNCTION
+)
 def compare(
     problem: Problem,
     mus: Sequence[float] | None = None,

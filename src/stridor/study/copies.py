@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..asking import FUNCTION, SEED, WHOLE, takes
 from ..errors import AnalysisError, CaseError
 from ..temporal.attractor import Spread, spread
 from ..temporal.simulate import Progress
 from ..temporal.simulate import simulate as march
-from ..temporal.trajectory import Trajectory
+from ..temporal.trajectory import RUN, Trajectory
+from .asked import require_friction
 from .settings import phases_of, settings_of
 from .workspace import Problem, Workspace
 
 PERTURBATION = 1e-12
 
 
+@takes(run=RUN, count=WHOLE, seed=SEED, progress=FUNCTION)
 def perturbed_copies(
     problem: Problem,
     run: Trajectory,
@@ -33,6 +36,7 @@ def perturbed_copies(
     """
     if count < 1:
         raise CaseError("copies", count, "at least 1")
+    require_friction(mu, several=False)
     if run.interrupted:
         raise AnalysisError("copies are compared with a finished run; this one was interrupted")
     speed = max((s.max_slip_speed for p in run.phases for s in p.contacts.values()), default=0.0)

@@ -9,6 +9,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from ..asking import NUMBER, SWITCH, SWITCH_OR_NONE, takes
 from ..case import Case
 from ..case.bodies import BeamBody, SolidBody
 from ..case.matrix_checks import MU
@@ -31,6 +32,7 @@ Watch = Literal["all", "unstable"]
 __all__ = ["Countermeasures", "Measure", "Verified", "rank_countermeasures"]
 
 
+@takes(added_mass=SWITCH, percent=NUMBER, margin=NUMBER, damped=SWITCH_OR_NONE)
 def rank_countermeasures(
     problem: Problem,
     *,

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import interrupts
+from ..asking import FUNCTION, NUMBER, NUMBERS, PAIR, takes
 from ..errors import AnalysisError, CaseError
 from ..periodic import Cycle, CycleBranch, CycleOnset, Cycles, Family, Unclosed, unfinished, why_not_shooting
 from ..periodic.harmonic import HarmonicFamily, why_not_harmonic
@@ -30,6 +31,10 @@ SHORT = 1e-3  # of the steady sliding of the range, where that ends within it
 BELOW = 0.05  # of the range: how far below its lowest onset cycles are looked for as well
 
 
+@takes(
+    between=PAIR.or_none(), harmonics=NUMBER.or_none(), push=NUMBERS.or_none(), points=NUMBER,
+    seconds=NUMBER.or_none(), runs=NUMBER, progress=FUNCTION, keep=FUNCTION,
+)  # fmt: skip
 def cycles(
     problem: Problem,
     mu: float | Sequence[float] | Array | None = None,

@@ -15,6 +15,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from ..asking import FUNCTION, NUMBER, NUMBERS, PAIR, TEXT, takes
 from ..errors import AnalysisError, CaseError
 from ..modal.source import by_receptance
 from ..typing import Array
@@ -35,6 +36,10 @@ FOLLOWED = (
 )
 
 
+@takes(
+    x=TEXT, y=TEXT, x_range=NUMBERS, y_range=NUMBERS, grid=PAIR, mu_range=PAIR.or_none(), bound=NUMBER,
+    progress=FUNCTION,
+)  # fmt: skip
 def damping_map(
     problem: Problem,
     x: str,

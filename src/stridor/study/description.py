@@ -22,6 +22,7 @@ from ..sliding import steady_nodes
 from ..sliding.surfaces import SurfaceSliding
 from ..system import System
 from ..temporal.inputs import unfit_in_time
+from ..temporal.schedule import lay_out
 from ..temporal.settings import coarse
 from ..temporal.simulate import plan, step_of
 from .matrix_reports import matrix_reports
@@ -201,10 +202,14 @@ def _time_lines(case: Case, system: System, data: dict[str, Any]) -> list[str]:
     elif path == "implicit":
         share = f"{1.0 / (step * case.modal.max_frequency_hz):.3g} to the period of modal.max_frequency_hz"
     few = coarse(step, settings, path)
+    phases, motion = phases_of(case), system.motion
+    schedule = lay_out(phases, step, list(system.loads), list(motion.names), motion.full_distance)
+    misfit = schedule.uneven(phases) if path in ("exact", "implicit") else schedule.stretched(phases)
     return [
         f"time step {step:.4g} s, {share}; {steps if steps < 1e12 else format(float(steps), '.3g')} steps",
         f"time loop: {path} path ({reason})",
         *((few,) if few else ()),
+        *((f"simulate refuses these phases at steps of {step:.4g} s: {misfit}",) if misfit else ()),
     ]
 
 

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ..asking import FUNCTION, NUMBER, NUMBERS, SWITCH, TEXT, takes
 from ..errors import CaseError
 from ..modal.painleve import steps_undetermined
 from ..sliding import full_motion
@@ -34,6 +35,10 @@ Values = float | Sequence[float] | Array | None
 Sweep = Literal["up", "down", "both"]
 
 
+@takes(
+    mu=NUMBERS.or_none(), load=NUMBERS.or_none(), speed=NUMBERS.or_none(), perturbation=NUMBERS.or_none(),
+    grid=SWITCH, observable=TEXT.or_none(), window=NUMBER, modes=SWITCH, records=SWITCH, progress=FUNCTION,
+)  # fmt: skip
 def ensemble(
     problem: Problem,
     *,
@@ -87,8 +92,8 @@ def ensemble(
         settings = replace(settings, initial=initial)
     if speed is not None and not np.any(system.motion.full):
         raise CaseError("speed", None, "no support of the case moves with a prescribed velocity, so none can be scaled")
-    _check_window(work, system, settings, window)
     looked_at = observable_of(observable, system, settings)
+    _check_window(work, system, settings, window)
     watch = settings.watch if records else (looked_at.owner,) if looked_at.of_point else ()
     seen = _Seen(looked_at, work.modal.max_frequency_hz, plan, records)
     outcome = march_all(

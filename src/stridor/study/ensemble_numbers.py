@@ -69,9 +69,10 @@ def named_observable(name: str, points: Sequence[str], contacts: Sequence[str], 
         return Observable(name, owner, quantity, direction, OF_POINT[quantity])
     if quantity in OF_CONTACT and owner in contacts:
         return Observable(name, owner, quantity, "", OF_CONTACT[quantity])
+    one_each = dict.fromkeys(contacts)  # those over surfaces stand in both lists
     accepted = (
         f"POINT.QUANTITY with a point among {', '.join(points) or 'none'} and {', '.join(OF_POINT)} (_x, _y for "
-        f"one direction), or CONTACT.QUANTITY with a contact among {', '.join(contacts) or 'none'} and "
+        f"one direction), or CONTACT.QUANTITY with a contact among {', '.join(one_each) or 'none'} and "
         f"{', '.join(OF_CONTACT)}"
     )
     raise CaseError("observable", name, accepted)

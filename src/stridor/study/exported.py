@@ -98,7 +98,7 @@ def exported_model(problem: Problem, mu: float | None = None) -> ExportedModel:
     Raises CaseError for a μ that is none, and without one where the case's own matrices depend on it; AnalysisError
     where there is no steady sliding.
     """
-    require_friction(mu)
+    require_friction(mu, several=False)
     work = Workspace.of(problem)
     if mu is None and work.varies:
         accepted = "missing – factors of the case's matrices depend on it already; give the one to export at (--mu)"

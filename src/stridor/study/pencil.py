@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from ..asking import SWITCH_OR_NONE, takes
 from ..modal.full.family import family_of
 from ..modal.quadratic import Quadratic
 from .asked import require_friction
 from .workspace import Problem, Workspace
 
 
+@takes(damped=SWITCH_OR_NONE)
 def pencil(problem: Problem, mu: float | None = None, *, damped: bool | None = None) -> Quadratic:
     """λ²M + λD(μ) + K(μ) of small motions about steady sliding at ``mu``, contact springs, friction and what the steady
     state adds included: what every reported eigenpair is judged by.
@@ -18,7 +20,7 @@ def pencil(problem: Problem, mu: float | None = None, *, damped: bool | None = N
     says), else with its gyroscopic part alone. Raises CaseError for a μ that is none and for none where contacts have
     different coefficients, AnalysisError where there is no steady sliding.
     """
-    require_friction(mu)
+    require_friction(mu, several=False)
     work = Workspace.of(problem)
     mu = work.one_friction() if mu is None else mu
     damped = work.modal.damped if damped is None else damped

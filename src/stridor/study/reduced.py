@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
+from ..asking import NUMBER, SWITCH, TABLE, takes
 from ..case import Case
 from ..case.expression import parse_expression
 from ..case.matrix_checks import MU
@@ -44,6 +45,7 @@ REMEMBERED = 8  # systems of a case with other numbers
 DAMPED = "modal.damped = false does not hold here: a reduced model keeps the damping of the case"
 
 
+@takes(box=TABLE, bound=NUMBER, whole=SWITCH, held_at=TABLE.or_none())
 def reduced_model(
     problem: Problem,
     box: Mapping[str, tuple[float, float]],

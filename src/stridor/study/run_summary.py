@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..agreement import dominant_response, linear_part
+from ..asking import takes
 from ..digits import hertz
 from ..notebook import Shown
 from ..sliding import full_motion, slip_speeds
@@ -16,7 +17,7 @@ from ..temporal.attractor import settled
 from ..temporal.changes import changes_of
 from ..temporal.energy import EnergyBalance, energy_balance
 from ..temporal.signals import Growth, components
-from ..temporal.trajectory import Trajectory
+from ..temporal.trajectory import RUN, Trajectory
 from .workspace import Problem, Workspace
 
 EXPONENTIAL = 0.5  # rms of ln amplitude about the fitted line, above which nothing is called exponential
@@ -125,6 +126,7 @@ def first_regime(run: Trajectory) -> dict[str, dict[str, float | None]]:
     return found
 
 
+@takes(run=RUN)
 def summarise(problem: Problem, run: Trajectory) -> RunSummary:
     """Dominant frequency, growth, energy balance of a run of a case, a system or a workspace."""
     work = Workspace.of(problem)

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 import scipy.sparse as sp
 
+from ..asking import SWITCH_OR_NONE, TABLE, takes
 from ..case import Case
 from ..case.overrides import number_at as number_of
 from ..case.overrides import split_path
@@ -37,7 +38,7 @@ from ..system.bodies import KnownBodies
 from ..system.imported import cleaned
 from ..typing import Array, ComplexArray
 from .analyses import modes as modes_at
-from .asked import names_of, require_band
+from .asked import names_of, require_band, require_friction
 from .provenance import provenance
 from .sensitivity_result import Sensitivities
 from .workspace import Problem, Workspace, friction_in_sliding, frictions_in_sliding
@@ -53,6 +54,7 @@ Choice = Literal["unstable", "all"] | Sequence[int]
 _FRICTION = ("mu", "parameters.mu.value")
 
 
+@takes(damped=SWITCH_OR_NONE, steps=TABLE.or_none())
 def sensitivities(
     problem: Problem,
     parameters: str | Sequence[str] = ("mu",),
@@ -209,6 +211,7 @@ class Linearised:
         """At ``mu`` (default: the case's own friction), settings as `sensitivities` takes them."""
         work = Workspace.of(problem)
         work.case("a sensitivity")
+        require_friction(mu, several=False)
         value = work.own_friction if mu is None else float(mu)
         if value is None:
             raise CaseError("mu", None, "one friction coefficient for all contacts: the case gives them different ones")

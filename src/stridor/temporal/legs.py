@@ -167,6 +167,7 @@ def legs_of(
         name = f"{last.name} {k + 1}"
         legs.append(_split(PhaseSpec(name, last.duration, {}, {}), window))
     whole = lay_out([p for leg in legs for p in leg], step, list(system.loads), names, system.motion.full_distance)
+    whole.require_whole([p for leg in legs for p in leg], even=False)
     if steady:
         whole = whole.from_steady()
     schedules: list[Schedule] = []

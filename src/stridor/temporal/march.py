@@ -141,7 +141,7 @@ class March:
             tangential_force=contacts[:, :, 1],
             slip_speed=contacts[:, :, 2],
             gap=contacts[:, :, 3],
-            status=contacts[:, :, 4].astype(np.int64),
+            status=contacts[:, :, 4].astype(np.int8),  # as files have it
             watch_names=settings.watch,
             displacement=watched[..., 0],
             velocity=watched[..., 1],

@@ -7,9 +7,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..errors import CaseError
 from ..typing import Array
 
 ROUNDED = 1e-3  # of a phase: as far as whole steps may end beside it
+_REMEDY = "give another temporal.step, or other durations of phases"
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,21 @@ class Schedule:
             if abs(taken - phase.duration) > ROUNDED * phase.duration:
                 return f"{phase.name} of {phase.duration:g} s would take {taken:g} s"
         return ""
+
+    def stretched(self, phases: Sequence[PhaseSpec]) -> str:
+        """Which of its phases is shorter than one step, in words; "" for none."""
+        for phase in phases:
+            if phase.duration < (1.0 - ROUNDED) * self.step:
+                return f"{phase.name} of {phase.duration:g} s would take {self.step:g} s"
+        return ""
+
+    def require_whole(self, phases: Sequence[PhaseSpec], *, even: bool) -> None:
+        """Refuse steps that make phases longer, as one step has to of a shorter one; ``even``: or round them to other
+        lengths, which the stability limit keeps explicit ones from. Raises CaseError."""
+        if even and (found := self.uneven(phases)):
+            raise CaseError("temporal.step", self.step, f"a step that phases are multiples of: {found}; {_REMEDY}")
+        if found := self.stretched(phases):
+            raise CaseError("temporal.step", self.step, f"a step no longer than any phase: {found}; {_REMEDY}")
 
     @property
     def jump(self) -> str:

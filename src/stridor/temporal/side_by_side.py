@@ -148,7 +148,7 @@ class Block:
             tangential_force=contacts[:, :, 1].copy(),
             slip_speed=contacts[:, :, 2].copy(),
             gap=contacts[:, :, 3].copy(),
-            status=contacts[:, :, 4].astype(np.int64),
+            status=contacts[:, :, 4].astype(np.int8),  # as files have it
             watch_names=settings.watch,
             displacement=watched[..., 0].copy(),
             velocity=watched[..., 1].copy(),

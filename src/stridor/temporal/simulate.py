@@ -17,7 +17,7 @@ from .inputs import check_inputs
 from .march import Checkpoint, March, Progress
 from .observe import Observer
 from .restart import settings_of_restart
-from .schedule import PhaseSpec, Schedule, lay_out
+from .schedule import PhaseSpec, lay_out
 from .settings import Settings, choose_step
 from .stepper import Disturbance, Stepper
 from .steppers.exact import exact_not_begun, exact_stepper, refuse, why_not_exact
@@ -82,8 +82,7 @@ def simulate(
         stepper = stepper_for(system, settings, mu, why)
     motion = system.motion
     schedule = lay_out(phases, stepper.scheme.step, list(system.loads), list(motion.names), motion.full_distance)
-    if settings.stepper in ("exact", "implicit"):
-        _check_step(phases, schedule)
+    schedule.require_whole(phases, even=settings.stepper in ("exact", "implicit"))
     if settings.initial == "steady-sliding":
         schedule = schedule.from_steady()
     march = March(stepper, schedule, settings, join=join, observe=observe)
@@ -92,12 +91,6 @@ def simulate(
     else:
         march.resume(restart, changed=changed)
     return march.run(progress, checkpoint, checkpoint_seconds)
-
-
-def _check_step(phases: Sequence[PhaseSpec], schedule: Schedule) -> None:
-    """Refuse steps that round phases to other lengths, which the stability limit keeps explicit ones from."""
-    if found := schedule.uneven(phases):
-        raise CaseError("temporal.step", schedule.step, f"a step that phases are multiples of: {found}")
 
 
 def plan(system: System, settings: Settings, phases: Sequence[PhaseSpec] = ()) -> tuple[str, str, StepLimit]:

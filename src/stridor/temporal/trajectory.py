@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from ..asking import instance
 from ..digits import readable
 from ..notebook import Shown, html_table
 from ..typing import Array, IntArray
 from .node_history import NodeHistory
 from .tables import STATUS, run_dataset, run_frame
 
-__all__ = ["HISTORIES", "STATUS", "ContactStatistics", "PhaseResult", "Trajectory"]
+__all__ = ["HISTORIES", "RUN", "STATUS", "ContactStatistics", "PhaseResult", "Trajectory"]
 
 # Fields of a Trajectory with a row for each record, beside its works.
 HISTORIES = (
@@ -153,3 +154,6 @@ class Trajectory(Shown):
         phase = self.phases[number]
         first, last = np.searchsorted(self.time, [phase.start - 1e-12, phase.end - 1e-12])
         return slice(int(first), max(int(last), int(first) + 1))
+
+
+RUN = instance(Trajectory, "a run, of st.simulate or st.open(path)")  # what calls take

@@ -9,10 +9,12 @@ import numpy as np
 from scipy import signal
 from scipy.io import wavfile
 
+from ..asking import NUMBER, TEXT, WHOLE, takes
 from ..case.points import choice
 from ..errors import AnalysisError, CaseError
+from ..notebook import Shown
 from ..study.ensemble_numbers import Observable, named_observable
-from ..temporal.trajectory import Trajectory
+from ..temporal.trajectory import RUN, Trajectory
 from ..typing import Array
 
 RATE = 44100  # samples a second
@@ -24,8 +26,8 @@ SHORTEST = 16  # records
 FAINT = 1e-3  # of the loudest: what is left in the range of hearing then is no more than the ends' own spectrum
 
 
-@dataclass(frozen=True)
-class Sound:
+@dataclass(frozen=True, repr=False)
+class Sound(Shown):
     """Samples (k,) from −1 to 1 at ``rate`` a second, of an observable [unit] that is ``loudest`` at most.
 
     slow: how many times slower, and lower, than it was. unheard: the share of its power above half the rate, which is
@@ -39,6 +41,10 @@ class Sound:
     loudest: float
     slow: float
     unheard: float
+
+    @property
+    def _line(self) -> str:
+        return self.sentence
 
     @property
     def seconds(self) -> float:
@@ -60,6 +66,7 @@ class Sound:
         return buffer.getvalue()
 
 
+@takes(run=RUN, observable=TEXT.or_none(), slow=NUMBER, phase=TEXT.or_none(), repeat=WHOLE)
 def sound(
     run: Trajectory, observable: str | None = None, *, slow: float = 1.0, phase: str | None = None, repeat: int = 1
 ) -> Sound:

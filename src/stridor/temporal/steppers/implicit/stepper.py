@@ -253,7 +253,10 @@ class ImplicitStepper:
     def state(self) -> dict[str, Array]:
         """What moves on from step to step, and displacement and velocity of the freedoms."""
         vectors, state = self.coordinates.basis.vectors, self.moving
-        held: dict[str, Array] = {f"implicit_{name}": values for name, values in state._asdict().items()}
+        counters = state.counters.copy()
+        counters[[KEPT, NODES_KEPT]] = 0  # rows of the records of this part alone
+        own = state._replace(counters=counters)
+        held: dict[str, Array] = {f"implicit_{name}": values for name, values in own._asdict().items()}
         return held | {"implicit_displacement": vectors @ state.q, "implicit_velocity": vectors @ state.v}
 
     def bounds(self) -> Bounds:

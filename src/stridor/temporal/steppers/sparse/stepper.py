@@ -23,7 +23,7 @@ from ...stepper import Disturbance
 from ...trajectory import Trajectory
 from ..curve import check_stiffness, left_the_line
 from .feet import NEW_ROWS, OFF_LINE
-from .forcing import KEPT, MOST_SWEEPS, STEPS_DONE, UNCONVERGED
+from .forcing import KEPT, MOST_SWEEPS, NODES_KEPT, STEPS_DONE, UNCONVERGED
 from .limit import step_limit_assembled
 from .loop import NOT_FINITE
 from .machine import Machine, assembled_machine, diagonal_mass
@@ -135,6 +135,13 @@ class SparseStepper:
 
     def state(self) -> dict[str, Array]:
         """What moves on from step to step."""
+        held = self._moving()
+        counters = held["state_counters"].copy()
+        counters[[KEPT, NODES_KEPT]] = 0  # rows of the records of this part alone
+        return held | {"state_counters": counters}
+
+    def _moving(self) -> dict[str, Array]:
+        """The same, the arrays themselves."""
         machine = self.machine
         held: dict[str, Array] = {"renewal": self.renewal, "renewed_at": self.renewed_at}
         for part, names in SAVED.items():
@@ -168,10 +175,10 @@ class SparseStepper:
             machine.state.motion[0] = restart.state["renewed_at"][size:]
             surfaces, nodes, _ = renew(machine, machine.surfaces)
             take_over(machine, surfaces, nodes)
-        for name, held in self.state().items():
+        for name, held in self._moving().items():
             held[:] = restart.state[name]
         machine.contacts.q[:] = machine.fields.q[machine.table.indices]
-        machine.state.counters[STEPS_DONE + 3 :] = 0
+        machine.state.counters[[KEPT, NODES_KEPT]] = 0  # files of older versions have them
         if changed:
             ratio = motion_ratio(self.parts, restart, self.system.motion.names)
             # The places that the supports have reached stay, whatever a unit of their motion is now.
