@@ -43,6 +43,7 @@ COARSE = {
 }
 # One damage in so many is enough to see a mechanism fail; all of them take minutes.
 SAMPLED = pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.slow), 13])
+THIRD = pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.slow), 3])
 KINDS = ("beams", "solids", "modes", "onsets", "compare", "boundary", "cycles", "along", "map", "changes", "points")
 
 
@@ -285,8 +286,14 @@ def _is_length(item: h5py.Dataset) -> bool:
     return b"not a netCDF variable" in item.attrs.get("NAME", b"")
 
 
+def dealt(kind: str, every: int, kinds_of_damage: tuple) -> tuple:
+    """Of the damages those in turn for this kind of result: one in so many; of all kinds together every one."""
+    return kinds_of_damage[KINDS.index(kind) % every :: every]
+
+
+@THIRD
 @pytest.mark.parametrize("kind", KINDS)
-def test_changes_through_hdf5_are_told(kind, files, tmp_path):
+def test_changes_through_hdf5_are_told(kind, every, files, tmp_path):
     """As one who edits the file would make them, the file's own hash left as it is."""
     path = tmp_path / files[kind].name
     with h5py.File(files[kind], "r") as file:
@@ -300,12 +307,13 @@ def test_changes_through_hdf5_are_told(kind, files, tmp_path):
             file[name][...] = before + 1
         assert f"({name} changed)" in loaded(path)[1]
         told += 1
-    for name in attributes:
+    for name in dealt(kind, every, tuple(attributes)):
         shutil.copyfile(files[kind], path)
         with h5py.File(path, "r+") as file:
             del file.attrs[name]
         assert loaded(path)[1], name
-    for change in ("deleted", "grouped", "linked", "outside", "huge", "elsewhere", "virtual"):
+    changes = ("deleted", "grouped", "linked", "outside", "huge", "elsewhere", "virtual")
+    for change in dealt(kind, every, changes):
         shutil.copyfile(files[kind], path)
         with h5py.File(path, "r+") as file:
             name = next(known for known in ("time", "mu", "x", "value", "percent") if known in file)
@@ -329,17 +337,18 @@ def test_changes_through_hdf5_are_told(kind, files, tmp_path):
     assert told > 0
 
 
+@THIRD
 @pytest.mark.parametrize("kind", KINDS)
-def test_files_cut_short_or_with_other_bytes(kind, files, tmp_path):
+def test_files_cut_short_or_with_other_bytes(kind, every, files, tmp_path):
     content = files[kind].read_bytes()
     path = tmp_path / files[kind].name
     assert loaded(files[kind])[0] is not None
-    for share in (0.0005, 0.2, 0.9, 0.999):
+    for share in dealt(kind, every, (0.0005, 0.2, 0.9, 0.999)):
         path.write_bytes(content[: max(9, int(share * len(content)))])
         assert "cut short" in loaded(path)[1]
     rng = np.random.default_rng(11)
     original = open_results(files[kind])
-    for _ in range(8):
+    for _ in range(8 // every + 1):
         data = bytearray(content)
         place = int(rng.integers(len(data)))
         data[place] ^= 1 << int(rng.integers(8))

@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import json
 import shlex
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +19,6 @@ from program import stridor
 from random_boundaries import disagreement, distance, eigenvalues, growing, off_the_curves, random_islands, random_plane
 from stridor.io.seals import seal
 from stridor.modal.boundary import Found, Plane, boundaries, march, search
-from stridor.study.boundary_problem import BoundaryAsked, plane_of, solved_problem
 from stridor.study.boundary_result import Boundary
 
 pytestmark = pytest.mark.verification
@@ -64,11 +65,19 @@ def crossing_branches(folder: Path) -> st.Case:
     return matrix_case(folder, terms, 0.8, more=PARAMETER.format(0.0, 2.0))
 
 
-def traced(case: st.Case, x: str, ends: tuple[float, float], high: float) -> tuple[Plane, Found]:
-    """What `stability_boundary` traces, before it is put into the units of the case."""
-    asked = BoundaryAsked((x, "mu"), (ends, (0.0, high)), "auto", 1e-8, 1e-3, LINES)
-    plane, _ = plane_of(solved_problem(case, asked, case.modal.max_frequency_hz), asked.ends)
-    return plane, boundaries(plane, 1e-3, LINES)
+def traced(case: st.Case, x: str, ends: tuple[float, float], high: float) -> tuple[Boundary, Plane, Found]:
+    """`stability_boundary` over x and mu, and what it traced, before it was put into the units of the case."""
+    kept: list[Found] = []
+
+    def keeping(*given: Any) -> Found:
+        kept.append(boundaries(*given))
+        return kept[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(import_module("stridor.study.boundary"), "boundaries", keeping)
+        boundary = st.stability_boundary(case, x, "mu", x_range=ends, y_range=(0.0, high), lines=LINES)
+    (found,) = kept
+    return boundary, found.plane, found
 
 
 def against_a_grid(plane: Plane, found: Found, columns: int = 9) -> None:
@@ -90,14 +99,14 @@ def against_a_grid(plane: Plane, found: Found, columns: int = 9) -> None:
 
 
 @pytest.fixture(scope="module")
-def fluttering(tmp_path_factory: pytest.TempPathFactory) -> tuple[st.Case, Boundary]:
-    """The boundary of `flutter`, for what changes nothing of it."""
+def fluttering(tmp_path_factory: pytest.TempPathFactory) -> tuple[st.Case, Boundary, Plane, Found]:
+    """The boundary of `flutter`, for what changes nothing of it, and what was traced."""
     case = flutter(tmp_path_factory.mktemp("flutter"))
-    return case, st.stability_boundary(case, "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, 3.0))
+    return case, *traced(case, "x", (-1.0, 2.0), 3.0)
 
 
-def test_growth_begins_where_the_closed_form_says(fluttering: tuple[st.Case, Boundary]) -> None:
-    case, found = fluttering
+def test_growth_begins_where_the_closed_form_says(fluttering: tuple[st.Case, Boundary, Plane, Found]) -> None:
+    _, found, plane, curves = fluttering
     (curve,) = found.curves
     assert found.agree
     assert curve.y == pytest.approx(1 + curve.x**2 / 4 + C**2 * (2 + curve.x / 2), rel=1e-10)
@@ -114,11 +123,11 @@ def test_growth_begins_where_the_closed_form_says(fluttering: tuple[st.Case, Bou
     assert found.unstable_modes_over(np.array([0.0, 2.0]), np.array([0.5, 1.5, 2.5])).tolist() == [[0, 1, 1], [0, 0, 1]]
     assert max(c.difference for c in found.confirmed) <= 1e-9
     assert max(c.residual for c in found.confirmed) <= 1e-14
-    against_a_grid(*traced(case, "x", (-1.0, 2.0), 3.0))
+    against_a_grid(plane, curves)
 
 
 def test_without_damping_the_place_where_modes_meet_is_followed(tmp_path: Path) -> None:
-    found = st.stability_boundary(flutter(tmp_path, 0.0), "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, 3.0))
+    found = st.stability_boundary(flutter(tmp_path, 0.0), "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, 3.0), lines=3)
     (curve,) = found.curves
     assert curve.y == pytest.approx(1 + curve.x**2 / 4, rel=1e-9)
     assert curve.tangent_y / curve.tangent_x == pytest.approx(curve.x / 2, rel=1e-6, abs=1e-8)
@@ -132,7 +141,7 @@ def test_divergence(tmp_path: Path) -> None:
     terms = [(EYE, "mass", ""), (np.array([[2.0, 1.0], [1.0, 0.0]]), "stiffness", ""), (0.1 * EYE, "damping", ""),
              (np.diag([0.0, 1.0]), "stiffness", "x"), (-EYE, "stiffness", "mu")]  # fmt: skip
     case = matrix_case(tmp_path, terms, 0.6, more=PARAMETER.format(1.0, 3.0))
-    found = st.stability_boundary(case, "x", "mu", x_range=(1.0, 3.0), y_range=(0.0, 4.0))
+    found = st.stability_boundary(case, "x", "mu", x_range=(1.0, 3.0), y_range=(0.0, 4.0), lines=3)
     assert [c.kind for c in found.curves] == ["divergence"] * 2
     assert found.agree
     for curve in found.curves:
@@ -150,7 +159,7 @@ def test_an_island(tmp_path: Path, centre: tuple[float, float], axes: tuple[floa
     """Growth inside an ellipse alone; the smaller one cuts no line, and is betrayed by what is counted between them."""
     (x, y), (a, b) = centre, axes
     case = damped_by(tmp_path, f"0.1*(((x - {x})/{a})**2 + ((mu - {y})/{b})**2 - 1)")
-    found = st.stability_boundary(case, "x", "mu", x_range=(0.0, 1.0), y_range=(0.0, 1.0))
+    found, *curves = traced(case, "x", (0.0, 1.0), 1.0)
     (curve,) = found.curves
     assert (curve.closed, curve.ends) == (True, ("closed", "closed"))
     assert (curve.x[0], curve.y[0]) == (curve.x[-1], curve.y[-1])
@@ -158,13 +167,13 @@ def test_an_island(tmp_path: Path, centre: tuple[float, float], axes: tuple[floa
     assert (found.unstable_modes(x, y), found.unstable_modes(x + 1.05 * a, y), found.unstable_modes(0, 0)) == (1, 0, 0)
     assert found.agree
     assert "Not excluded: closed curves that lie between the lines" in found.sentence
-    against_a_grid(*traced(case, "x", (0.0, 1.0), 1.0))
+    against_a_grid(*curves)
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
 def test_pieces_between_points_are_as_near_as_asked_for(tmp_path: Path, tolerance: float) -> None:
     case = damped_by(tmp_path, "0.1*(((x - 0.46)/0.2)**2 + ((mu - 0.55)/0.15)**2 - 1)")
-    found = st.stability_boundary(case, "x", "mu", x_range=(0.0, 1.0), y_range=(0.0, 1.0), tolerance=tolerance)
+    found = st.stability_boundary(case, "x", "mu", x_range=(0.0, 1.0), y_range=(0.0, 1.0), tolerance=tolerance, lines=3)
     (curve,), ((x, y, _),) = found.curves, found.polylines()
     assert found.agree
     assert curve.deviation <= tolerance
@@ -187,7 +196,7 @@ def test_an_island_that_cuts_no_line_and_is_nowhere_counted_is_not_excluded(tmp_
 def missed_islands(seed: int, folder: Path) -> tuple[int, int]:
     """How many islands of growth no curve goes round, of how many."""
     formula, islands = random_islands(seed)
-    _, found = traced(damped_by(folder, formula), "x", (0.0, 1.0), 1.0)
+    _, _, found = traced(damped_by(folder, formula), "x", (0.0, 1.0), 1.0)
     points = np.vstack([np.zeros((0, 2)), *(curve.points for curve in found.curves)])
     near = [np.abs(points[:, None] - island[None]).max(axis=2).min(initial=1.0) for island in islands]
     assert found.agree
@@ -242,20 +251,19 @@ def test_shading_is_true_where_growing_modes_pass_the_highest_frequency(tmp_path
 
 def test_branches_that_all_but_meet_are_not_taken_for_one_another(tmp_path: Path) -> None:
     """(x − 1/2)(μ − 1/2) = 1e-4: two branches 1 % of the ranges from the saddle between them."""
-    case = damped_by(tmp_path, "(x - 0.5)*(mu - 0.5) - 1e-4")
-    found = st.stability_boundary(case, "x", "mu", x_range=(0.0, 1.0), y_range=(0.0, 1.0))
+    found, *curves = traced(damped_by(tmp_path, "(x - 0.5)*(mu - 0.5) - 1e-4"), "x", (0.0, 1.0), 1.0)
     assert found.agree
     assert len(found.curves) == 2
     for curve in found.curves:
         assert (curve.x - 0.5) * (curve.y - 0.5) == pytest.approx(np.full(len(curve.x), 1e-4), abs=1e-10)
         assert len(set(np.sign(curve.x - 0.5))) == 1
-    against_a_grid(*traced(case, "x", (0.0, 1.0), 1.0))
+    against_a_grid(*curves)
 
 
 def test_a_corner_on_an_edge_is_no_curve_of_its_own(tmp_path: Path) -> None:
     """|x − 1/2| = μ/10: two straight lines from a point on μ = 0, which is an onset of that line."""
     case = damped_by(tmp_path, "abs(x - 0.5) - mu*0.1")
-    found = st.stability_boundary(case, "x", "mu", x_range=(0.0, 1.0), y_range=(0.0, 1.0))
+    found = st.stability_boundary(case, "x", "mu", x_range=(0.0, 1.0), y_range=(0.0, 1.0), lines=3)
     assert found.agree
     assert len(found.curves) == 2
     for curve in found.curves:
@@ -270,8 +278,7 @@ def test_a_factor_that_is_not_real_within_the_ranges_is_named_by_its_path(tmp_pa
 
 def test_branches_that_cross(tmp_path: Path) -> None:
     """Each keeps its frequency through the crossing, and the lower of both is the outer boundary."""
-    case = crossing_branches(tmp_path)
-    found = st.stability_boundary(case, "x", "mu", x_range=(0.0, 2.0), y_range=(0.0, 3.0))
+    found, *curves = traced(crossing_branches(tmp_path), "x", (0.0, 2.0), 3.0)
     assert found.agree
     assert len(found.curves) == 2
     low, high = sorted(found.curves, key=lambda c: c.frequency_hz.min())
@@ -281,7 +288,7 @@ def test_branches_that_cross(tmp_path: Path) -> None:
         beyond = curve.y[order] > np.interp(curve.x[order], other.x[of_other], other.y[of_other])
         clear = np.abs(curve.x[order] - 1.0) > 0.1
         assert np.array_equal(curve.modes_beside[order][clear], beyond[clear].astype(int))
-    against_a_grid(*traced(case, "x", (0.0, 2.0), 3.0))
+    against_a_grid(*curves)
 
 
 def test_two_beams_against_onsets_of_the_full_problem() -> None:
@@ -336,7 +343,7 @@ def test_neither_number_may_be_friction() -> None:
     """At a point of a curve over two other numbers the case's own friction is an onset."""
     case = paper_case()
     paths = "materials.steel.density", "bodies.beam1.damping.mass"
-    found = st.stability_boundary(case, *paths, x_range=(7000.0, 8000.0), y_range=(0.0, 2000.0), max_frequency_hz=20e3)
+    found = st.stability_boundary(case, *paths, x_range=(7000.0, 8000.0), y_range=(0.0, 2000.0), max_frequency_hz=20e3, lines=2)
     assert found.curves
     curve = found.curves[0]
     k = len(curve.x) // 2
@@ -352,7 +359,7 @@ def test_an_end_without_any_damping_is_left_out(tmp_path: Path) -> None:
     terms = [(EYE, "mass", ""), (np.array([[2.0, 1.0], [1.0, 3.0]]), "stiffness", ""),
              (np.array([[0.0, -1.0], [0.0, 0.0]]), "stiffness", "mu"), (np.diag([1.0, 0.05]), "damping", "x")]  # fmt: skip
     case = matrix_case(tmp_path, terms, 0.6, more=PARAMETER.format(0.0, 0.2))
-    found = st.stability_boundary(case, "x", "mu", x_range=(0.0, 0.2), y_range=(0.0, 3.0))
+    found = st.stability_boundary(case, "x", "mu", x_range=(0.0, 0.2), y_range=(0.0, 3.0), lines=3)
     (curve,) = found.curves
     assert curve.x.min() == pytest.approx(0.2e-4)
     assert curve.y[np.argmin(curve.x)] == pytest.approx(1 + 0.05 / 1.05**2, rel=1e-6)
@@ -396,8 +403,8 @@ def test_a_curve_that_is_lost_is_not_called_whole(tmp_path: Path, monkeypatch: p
     """A march that ends in the middle, a seed that leads to nothing, and a search that finds no onset are all told."""
     case = flutter(tmp_path)
 
-    def boundary() -> Boundary:
-        return st.stability_boundary(case, "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, 3.0), lines=3)
+    def boundary(lines: int = 2) -> Boundary:
+        return st.stability_boundary(case, "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, 3.0), lines=lines)
 
     with monkeypatch.context() as patch:
         patch.setattr(march, "MOST", 3)
@@ -421,13 +428,13 @@ def test_a_curve_that_is_lost_is_not_called_whole(tmp_path: Path, monkeypatch: p
     with monkeypatch.context() as patch:
         lay = search._CurveSearch._lay
         patch.setattr(search._CurveSearch, "_lay", lambda self, axis, value: None if value > 0.6 else lay(self, axis, value))
-        assert boundary().agree  # the curve is found on other lines
+        assert boundary(3).agree  # the curve is found on other lines
 
 
 @pytest.mark.parametrize("factor", ["x - mu", "mu - x", "x**2 - mu**2 + 0.1 * (x - mu)"])
 def test_a_boundary_through_the_points_at_which_is_counted(tmp_path: Path, factor: str) -> None:
     """μ = x passes through the middle of every cell, where rounding would decide what grows."""
-    found = st.stability_boundary(damped_by(tmp_path, factor), "x", "mu", x_range=(0.0, 1.0), y_range=(0.0, 1.0))
+    found = st.stability_boundary(damped_by(tmp_path, factor), "x", "mu", x_range=(0.0, 1.0), y_range=(0.0, 1.0), lines=3)
     assert found.agree
     (curve,) = found.curves
     assert curve.y == pytest.approx(curve.x, abs=1e-9)
@@ -464,7 +471,7 @@ def test_what_is_refused(words: dict, said: str) -> None:
 
 def test_the_verb(tmp_path: Path) -> None:
     flutter(tmp_path)
-    words = ("boundary", "case.toml", "--x", "x", "--x-range", "-1:2", "--y", "mu", "--y-range", "0:3")
+    words = ("boundary", "case.toml", "--x", "x", "--x-range", "-1:2", "--y", "mu", "--y-range", "0:3", "--lines", "3")
     done = stridor(*words, "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
@@ -478,7 +485,7 @@ def test_the_verb(tmp_path: Path) -> None:
     assert "one curve bounds where nothing grows, down to x = " in " ".join(said.split())
     following = shlex.split(said.partition("Next: stridor ")[2].replace("\\\n", " "))
     assert stridor(*following, cwd=tmp_path).returncode == 0
-    called = st.stability_boundary(st.load(tmp_path / "case.toml"), "x", "mu", x_range=(-1, 2), y_range=(0, 3))
+    called = st.stability_boundary(st.load(tmp_path / "case.toml"), "x", "mu", x_range=(-1, 2), y_range=(0, 3), lines=3)
     assert called.to_json() == {k: v for k, v in document.items() if k != "files"}
     data = called.to_xarray()
     assert data["x"].values.tolist() == curve["x"]
@@ -489,10 +496,10 @@ def test_the_verb(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("empty", [False, True])
 def test_a_boundary_comes_back_from_its_file(
-    tmp_path: Path, empty: bool, fluttering: tuple[st.Case, Boundary]
+    tmp_path: Path, empty: bool, fluttering: tuple[st.Case, Boundary, Plane, Found]
 ) -> None:
     high = 1e-3 if empty else 3.0
-    case, found = fluttering
+    case, found, _, _ = fluttering
     if empty:
         found = st.stability_boundary(case, "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, high))
     assert (len(found.curves) == 0) == empty
@@ -513,7 +520,7 @@ def test_a_boundary_comes_back_from_its_file(
     [("x_range", []), ("y_range", [1.0, 0.0]), ("method", 7), ("counted", [{}]), ("curves", None), ("lines_x", ["a"])],
 )
 def test_a_boundary_that_is_none_is_refused_in_one_message(
-    tmp_path: Path, name: str, value: object, fluttering: tuple[st.Case, Boundary]
+    tmp_path: Path, name: str, value: object, fluttering: tuple[st.Case, Boundary, Plane, Found]
 ) -> None:
     data = fluttering[1].to_xarray()
     document = json.loads(data.attrs["boundary"]) | {name: value}

@@ -101,9 +101,10 @@ def apart(one: np.ndarray, other: np.ndarray) -> float:
 def test_random_cycles_that_only_slip_have_the_multipliers_of_their_motions(seeds: Sequence[int]):
     """None is missing, however far the other modes are above the frequency of the cycle."""
     met = 0
+    asked: dict[str, Any] = {"points": 25} if len(seeds) > 2 else {"points": 4, "runs": 0}  # runs are most of the time
     for seed in seeds:
         masses = Masses(seed)
-        found = st.cycles(masses.workspace(), between=(0.0, 1.5), method="harmonic", points=25 if len(seeds) > 2 else 4)
+        found = st.cycles(masses.workspace(), between=(0.0, 1.5), method="harmonic", **asked)
         for branch in found.branches:
             for number in branch.cycles[1::3]:
                 cycle = found.cycles[number]
@@ -171,6 +172,7 @@ def test_missing_multipliers_leave_stability_unknown(monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(hills, "by_hill", none)
     monkeypatch.setattr(hills, "by_monodromy", none)
-    found = st.cycles(Masses(7).workspace(), between=(0.0, 1.5), method="harmonic", points=2)
+    found = st.cycles(Masses(7).workspace(), between=(0.0, 1.5), method="harmonic", points=2, runs=0)
+    assert found.cycles
     assert all(c.stable is None and c.outside is None and not len(c.multipliers) for c in found.cycles)
     assert any("or some of them were not found" in w for w in found.warnings)

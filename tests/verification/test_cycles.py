@@ -263,7 +263,7 @@ def test_a_run_of_explicit_steps_comes_to_the_same_cycle(mu: float):
 
 @pytest.fixture(scope="module")
 def slow_belt() -> Cycles:
-    return st.cycles(mode_coupling(DAMPED, 0.1), between=(0.1, 1.8))
+    return st.cycles(mode_coupling(DAMPED, 0.1), between=(0.1, 1.8), runs=0)  # what runs add: test_cycles_from_runs
 
 
 def test_a_branch_begins_at_the_onset(slow_belt: Cycles):
@@ -299,7 +299,7 @@ def test_motions_come_to_the_cycles_of_the_branch(slow_belt: Cycles):
 
 @pytest.fixture(scope="module")
 def fast_belt() -> Cycles:
-    return st.cycles(mode_coupling(DAMPED, 1.0), between=(0.1, 1.8))
+    return st.cycles(mode_coupling(DAMPED, 1.0), between=(0.1, 1.8), runs=0)
 
 
 def test_an_unstable_cycle_lies_between_two_that_are_reached(fast_belt: Cycles):
@@ -390,7 +390,7 @@ def test_a_branch_whose_end_at_the_edge_is_lost_says_so(monkeypatch: pytest.Monk
         raise st.AnalysisError("nothing is there")
 
     monkeypatch.setattr(ShootingBranch, "at", lost)
-    found = st.cycles(mode_coupling(DAMPED, 0.1), between=(0.7, 0.78), push=0.2)
+    found = st.cycles(mode_coupling(DAMPED, 0.1), between=(0.7, 0.78), push=0.2, runs=0)
     branch = found.branches[0]
     assert branch.ends.endswith("its cycle at the edge, μ = 0.78, could not be closed: nothing is there")
     assert f"branch 1: {branch.ends}" in found.missing
@@ -398,7 +398,7 @@ def test_a_branch_whose_end_at_the_edge_is_lost_says_so(monkeypatch: pytest.Monk
 
 def test_undamped_modes_that_meet_have_no_branch_of_their_own():
     """The onset is a double root: two modes in one, which the exact motion cannot go on with. That is said, not hidden."""
-    found = st.cycles(mode_coupling(), between=(0.5, 0.9), push=[0.5], seconds=0.3, points=2)
+    found = st.cycles(mode_coupling(), between=(0.5, 0.9), push=[0.5], seconds=0.3, points=2, runs=0)
     assert found.missing[0].startswith("no branch was found from the onset at μ = 0.75 ")
 
 

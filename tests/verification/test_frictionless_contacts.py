@@ -5,6 +5,7 @@ The truth is put together here, on dense matrices from the rows of the contacts:
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 from pathlib import Path
 
@@ -99,10 +100,12 @@ def pushes(system: System, mu: dict[str, float]) -> tuple[np.ndarray, np.ndarray
     return normal, normal - (own * np.sign(slip))[:, None] * nodes.tangent.toarray(), 1.0 / nodes.compliance
 
 
-def truth(system: System, mu: dict[str, float], held: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Normal forces of steady sliding, and eigenvalues of the nodes that touch there, or of those ``held``."""
+def sliding(
+    system: System, mu: dict[str, float], held: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Normal forces of steady sliding with the nodes that touch there, or those ``held``, and stiffness with them."""
     normal, push, spring = pushes(system, mu)
-    m, c, k = (a.toarray() for a in (system.mass, system.damping, system.stiffness))
+    k = system.stiffness.toarray()
     force = sum(system.loads.values()) - system.motion.damping @ system.motion.full
     touch = np.ones(len(spring), dtype=bool) if held is None else held
     for _ in range(50):
@@ -112,10 +115,17 @@ def truth(system: System, mu: dict[str, float], held: np.ndarray | None = None) 
         before, touch = touch, gap < 0.0 if held is None else held
         if np.array_equal(before, touch):
             break
+    return np.where(touch, -spring * gap, 0.0), stiff
+
+
+def truth(system: System, mu: dict[str, float], held: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Normal forces of steady sliding, and eigenvalues of the nodes that touch there, or of those ``held``."""
+    forces, stiff = sliding(system, mu, held)
+    m, c = system.mass.toarray(), system.damping.toarray()
     n = len(m)
     inverse = np.linalg.inv(m)
     whole = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ stiff, -inverse @ c]])
-    return np.where(touch, -spring * gap, 0.0), sl.eigvals(whole)
+    return forces, sl.eigvals(whole)
 
 
 def growing(system: System, touching: np.ndarray | None = None, highest: float = 60e3, **mu: float) -> int:
@@ -139,12 +149,29 @@ def with_friction(**given: float) -> Case:
     return loads(TEXT).with_({f"contacts.{name}.friction.coefficient": mu for name, mu in given.items()})
 
 
+@functools.cache
+def true_of(mu: float) -> tuple[np.ndarray, np.ndarray]:
+    """`truth` with this friction where the case has some."""
+    return truth(st.build_system(with_friction()), {"rub": mu, "back": 0.0, "guide": 0.0})
+
+
+@functools.cache
+def onsets_of_the_case() -> st.Onsets:
+    return st.onsets(with_friction())
+
+
+@functools.cache
+def own_friction(source: str) -> list[float]:
+    """At which μ modes are sought that are asked for without one."""
+    return st.modes(with_friction().with_({"modal.source": source})).mu.tolist()
+
+
 @pytest.mark.parametrize("mu", [0.0, 0.3, 0.7])
 @pytest.mark.parametrize("source", ["krylov", "reduced", "full"])
 def test_a_contact_given_no_friction_has_none_at_any_coefficient(mu: float, source: str) -> None:
     case = with_friction().with_({"modal.source": source})
     system, found = st.build_system(case), st.steady_sliding(case, mu)
-    forces, values = truth(system, {"rub": mu, "back": 0.0, "guide": 0.0})
+    forces, values = true_of(mu)
     assert found.normal_force == pytest.approx(forces, rel=1e-8, abs=1e-8 * forces.max())
     nodes = system.contact_nodes()
     for k, name in enumerate(nodes.names):
@@ -152,12 +179,11 @@ def test_a_contact_given_no_friction_has_none_at_any_coefficient(mu: float, sour
         ratio = np.abs(found.friction_force[mine]).sum() / found.normal_force[mine].sum()
         assert ratio == pytest.approx(mu if name == "rub" else 0.0)
     agree(st.modes(case, mu), values, 55e3)
-    assert st.modes(case).mu.tolist() == [0.4]
+    assert own_friction(source) == [0.4]
 
 
 def test_onsets_over_mu_are_those_of_the_contacts_with_friction() -> None:
-    case = with_friction()
-    system, found = st.build_system(case), st.onsets(case)
+    system, found = st.build_system(with_friction()), onsets_of_the_case()
     assert len(found.onsets) > 3
 
     for mu in {o.mu for o in found.onsets}:
@@ -228,11 +254,12 @@ def test_modes_without_a_coefficient_are_those_of_each_contact_s_own() -> None:
     agree(found, values, 55e3)
     assert any("each contact has its own friction coefficient (rub 0.4, back 0.1)" in note for note in found.notes)
     # Over μ both have the same, which is said.
-    agree(st.modes(case, 0.4), truth(system, {"rub": 0.4, "back": 0.4, "guide": 0.0})[1], 55e3)
+    same = st.modes(case, 0.4)
+    agree(same, truth(system, {"rub": 0.4, "back": 0.4, "guide": 0.0})[1], 55e3)
     said = "to which the case gives different ones (rub 0.4, back 0.1), so that their ratios do not count here; "
-    for notes in (st.modes(case, 0.4).notes, st.onsets(case).notes, st.steady_sliding(case, 0.4).warnings):
+    for notes in (same.notes, st.onsets(case).notes, st.steady_sliding(case, 0.4).warnings):
         assert sum(said in note for note in notes) == 1
-    for notes in (found.notes, st.steady_sliding(case).warnings, st.onsets(with_friction()).notes):
+    for notes in (found.notes, st.steady_sliding(case).warnings, onsets_of_the_case().notes):
         assert not any(said in note for note in notes)
     for refused in (lambda: st.compare(case, only=["growth"]), lambda: st.pencil(case)):
         with pytest.raises(CaseError, match=r"name it .*`simulate` without μ answer with each contact's own"):
@@ -256,7 +283,7 @@ def test_onsets_along_the_friction_of_one_contact_leave_the_others_theirs() -> N
     assert len(found)
 
     def growing_at(mu: float) -> int:
-        touching = truth(system, {"rub": mu, "back": 0.1, "guide": 0.0})[0] > 0.0
+        touching = sliding(system, {"rub": mu, "back": 0.1, "guide": 0.0})[0] > 0.0
         return growing(system, touching, rub=mu, back=0.1, guide=0.0)
 
     changes = 0
@@ -269,8 +296,7 @@ def test_onsets_along_the_friction_of_one_contact_leave_the_others_theirs() -> N
 
 
 def test_cycles_begin_at_onsets_beside_a_guide_without_friction() -> None:
-    case = with_friction()
-    system, onset = st.build_system(case), st.onsets(case).onsets[0]
+    system, onset = st.build_system(with_friction()), onsets_of_the_case().onsets[0]
     family = HarmonicFamily(system, 60e3)
     omega = 2 * np.pi * onset.frequency_hz
     scale = scales(family, omega, onset.mu, 3)
@@ -330,7 +356,7 @@ def test_what_friction_would_do_in_a_contact_without_any() -> None:
     system = st.build_system(case)
     found = st.sensitivities(case, [BACK, "mu"], mu=0.3)
     assert found.values.tolist() == [0.0, 0.3]
-    touching = truth(system, {"rub": 0.3, "back": 0.0, "guide": 0.0})[0] > 0.0
+    touching = sliding(system, {"rub": 0.3, "back": 0.0, "guide": 0.0})[0] > 0.0
     step = 1e-5
 
     def moved(**mu: float) -> np.ndarray:

@@ -66,7 +66,7 @@ def test_onsets_below_the_friction_at_which_something_jams() -> None:
     assert any("nothing was solved" in note and "that is at μ = 1.32" in note for note in found.notes)
 
 
-@pytest.mark.parametrize("coefficient", [0.3, 1.5])
+@pytest.mark.parametrize("coefficient", [pytest.param(0.3, marks=pytest.mark.slow), 1.5])
 def test_what_is_asked_for_does_not_depend_on_a_case_that_jams_at_its_own_friction(coefficient: float) -> None:
     case = two_masses(coefficient)
     found = st.onsets(case, (0.0, 1.0))
