@@ -1,4 +1,4 @@
-"""A browser and a server for the tests of a module: while a browser is there, nothing else may run an event loop."""
+"""A browser and a server for all tests here: while the browser is there, its thread can run no other event loop."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import pytest
 from browsing import CHROMIUM, begin_again, page_at, serving
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def address() -> Generator[str]:
     with serving() as (_, found):
         yield found
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def browser() -> Generator[Any]:
     sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     with sync_api.sync_playwright() as playwright:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
@@ -39,7 +40,8 @@ def asked(path: str, *headers: tuple[bytes, bytes], kind: str = "http", body: in
         await send({"type": "http.response.body", "body": b"in"})
 
     scope = {"type": kind, "path": path, "headers": list(headers)}
-    asyncio.run(Guard(app, TOKEN, PORT)(scope, receive, send))
+    with ThreadPoolExecutor(1) as other:  # in this thread a browser of other tests may have its event loop
+        other.submit(asyncio.run, Guard(app, TOKEN, PORT)(scope, receive, send)).result()
     return sent
 
 

@@ -56,7 +56,9 @@ def test_what_is_no_study_is_refused(tmp_path: Path) -> None:
         study_at(tmp_path / "nowhere")
 
 
+# Of a study of onsets other words stand beside the same numbers: those of its store are looked at above.
 @WITH_BROWSER
+@pytest.mark.parametrize("store", ["modes", pytest.param("onsets", marks=pytest.mark.slow)], indirect=True)
 def test_a_click_on_a_sample_takes_the_bench_there(browser, store: Path) -> None:
     pytest.importorskip("nicegui", reason="the extra app is not installed")
     with serving(str(store)) as (_, address), page_at(browser, address) as page:

@@ -200,7 +200,7 @@ def test_interruption_keeps_what_was_computed_and_a_restart_ends_alike(folder: P
     assert stridor("simulate", "two-beams.toml", "--quiet", "--out", "warm", *SETS, cwd=folder).returncode == 0
     path = folder / "two-beams.out" / "simulate.nc"
     # On a loaded machine Ctrl-C may come before the first step: then there is nothing to keep.
-    for seconds in (2.0, 5.0, 10.0, 20.0):
+    for seconds in (1.0, 3.0, 10.0, 20.0):
         code, log = interrupted_run(folder, long, seconds)
         if path.exists():
             break

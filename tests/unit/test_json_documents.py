@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from documented import assert_told, told_names
 from program import stridor
 from stridor.app.option_table import EVERY
 from stridor.case import template_text
+from undrawn import nothing_drawn
 
 FEW = [
     "bodies.beam1.elements=6",
@@ -46,6 +48,12 @@ parameters.mu.range = [0.0, 0.2]
 parameters."bodies.beam1.damping.mass".range = [1.0, 10.0]
 sampling = { method = "sobol", samples = 4 }
 """
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_pictures() -> Generator[None]:
+    with nothing_drawn():
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,7 @@ from stridor.app import arguments, option_table
 from stridor.app.cli import app
 from stridor.app.option_table import COMPUTING, EVERY, PAGES, READING, TABLE
 from stridor.errors import CaseError
+from undrawn import nothing_drawn
 
 DOCS = Path(__file__).parents[2] / "docs" / "commands.md"
 
@@ -81,14 +82,16 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def run(folder: Path, *words: str) -> dict[str, typing.Any]:
-    done = stridor(words[0], "two-beams.toml", *words[1:], "--json", "--quiet", cwd=folder)
+    with nothing_drawn():
+        done = stridor(words[0], "two-beams.toml", *words[1:], "--json", "--quiet", cwd=folder)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
 
 def test_a_band_of_modes_is_said_to_be_one_wherever_they_are_written(folder: Path) -> None:
     every = {m["branch"]: m for m in run(folder, "modes", "--max-frequency", "20e3")["modes"][0]}
-    found = run(folder, "modes", "--band", "5000:8641.05", "--max-frequency", "20e3")
+    drawn = stridor("modes", "two-beams.toml", "--band", "5000:8641.05", "--max-frequency", "20e3", "--json", cwd=folder)
+    found = json.loads(drawn.stdout)
     (listed,) = found["modes"]
     assert {m["branch"]: m for m in listed} == {k: m for k, m in every.items() if 5000 <= m["frequency_hz"] <= 8641.05}
     assert [m["branch"] for m in listed] == [7, 9, 10]  # numbers are those of the whole list; 8 is at 8641.12 Hz

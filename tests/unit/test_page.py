@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from stridor.app.conclusions import of_countermeasures
 from stridor.app.explore import show_countermeasures
 from stridor.app.output import _filled, stdout
 from stridor.study.measures import Countermeasures, Measure, Verified
+from undrawn import nothing_drawn
 
 COARSE = [
     "--set", "bodies.beam1.elements=6", "--set", "bodies.beam2.elements=18", "--set", "temporal.step=4e-7",
@@ -105,6 +107,12 @@ ENDS = {
     ),
     "export two-beams.toml --out there": ("columns of loads: press", "onsets there/matrices.toml"),
 }  # fmt: skip
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_pictures() -> Generator[None]:
+    with nothing_drawn():
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Generator
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ from stridor.io.plain_values import of_plain, to_plain
 from stridor.study import analyses, modal_parts
 from stridor.study.case_key import case_key
 from stridor.study.parts import OF_REPORT, chosen_parts
+from undrawn import nothing_drawn
 
 STIFFNESS = np.array([[2.0, 0.0], [0.0, 2.2]])
 TEXT = """
@@ -59,6 +61,12 @@ def written(folder: Path, stiffness: np.ndarray = STIFFNESS, text: str = TEXT) -
 
 def refuse(*args: Any, **kwargs: Any) -> Any:
     raise AssertionError("this was computed")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def no_pictures() -> Generator[None]:
+    with nothing_drawn():
+        yield
 
 
 @pytest.fixture
@@ -311,7 +319,7 @@ perturbation = 1e-3
 critical = false
 """,
     )
-    case = st.loads(text)
+    case = st.loads(text).with_({"bodies.block.mesh.divisions": [2, 2], "bodies.slider.mesh.divisions": [6, 1]})
     nothing_computed.setattr(analyses, "simulate", refuse)
     alone = st.run(case, tmp_path, only=["modes", "onsets"], skip=["report"])
     assert alone.report is None

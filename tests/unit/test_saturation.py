@@ -11,6 +11,7 @@ import stridor as st
 from rubbing_block import rubbing_block
 from stridor.study.saturation import unsaturated
 from stridor.view.words import verdict
+from undrawn import nothing_drawn
 
 TEXT = rubbing_block(
     "friction_range = [0.0, 0.6]\nmax_frequency_hz = 30e3\nsweep_points = 3",
@@ -36,7 +37,8 @@ def case() -> st.Case:
 
 @pytest.fixture(scope="module")
 def outcome(case: st.Case, tmp_path_factory: pytest.TempPathFactory):
-    return st.run(case, tmp_path_factory.mktemp("run"))
+    with nothing_drawn():
+        return st.run(case, tmp_path_factory.mktemp("run"))
 
 
 def test_a_run_that_still_grows_says_how_long_it_takes(case: st.Case, outcome) -> None:

@@ -24,6 +24,7 @@ from stridor.studies.plots import growth_over, onset_cloud, root_locus
 from stridor.studies.result import StudyResult
 from stridor.studies.rows import variables
 from stridor.studies.sampling import samples
+from undrawn import nothing_drawn
 
 MASS, THICK = "bodies.beam1.damping.mass", "bodies.beam1.thickness"
 DECADES = {"range": (1.0, 1e4), "points": 5, "spacing": "logarithmic"}
@@ -481,7 +482,8 @@ def test_a_page_has_every_figure_with_its_words(tmp_path: Path) -> None:
     for compute, (parameters, columns) in WHOLE.items():
         result = result_of(onset_study() if compute == "onsets" else study_of(parameters, compute=compute), columns)
         drawn = st.study_figures(result)
-        page = write_page(result, drawn, tmp_path / f"{compute}.html").read_text(encoding="utf-8")
+        with nothing_drawn():
+            page = write_page(result, drawn, tmp_path / f"{compute}.html").read_text(encoding="utf-8")
         assert page.count("<img ") == page.count("<figcaption>") == len(drawn)
         for name in drawn:
             assert f'id="figure-{name}"' in page

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,28 +11,29 @@ import pytest
 import stridor as st
 from pages import ROOT, Page
 from rubbing_block import rubbing_block
+from stridor.modal.onset import Onsets
 
 DOCS = ROOT / "docs"
 
 
 @pytest.fixture(scope="module")
-def followed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
-    """The folder in which everything was done, and what each command printed."""
+def followed(tmp_path_factory: pytest.TempPathFactory) -> Page:
+    """Everything that was done, what each command printed, and what its Python has."""
     folder = tmp_path_factory.mktemp("tutorial")
     for file in (DOCS / "tutorial-matrices").iterdir():
         shutil.copy(file, folder)
     page = Page(DOCS / "tutorial-matrices.md", folder, slow=False).follow()
     assert "note" not in page.warned
-    return folder, page.printed
+    return page
 
 
-def test_every_command_is_run(followed: tuple[Path, dict[str, str]]) -> None:
-    verbs = [command.split()[1] for command in followed[1]]
+def test_every_command_is_run(followed: Page) -> None:
+    verbs = [command.split()[1] for command in followed.printed]
     assert verbs == ["new", "export", "matrices", "modes", "sensitivities", "countermeasures", "modes", "export", "onsets", "modes", "check", "onsets"]
 
 
-def test_what_the_text_says(followed: tuple[Path, dict[str, str]]) -> None:
-    _, printed = followed
+def test_what_the_text_says(followed: Page) -> None:
+    printed = followed.printed
     assert "K − Kᵀ has rank 2" in printed["stridor matrices brake.toml"]
     growing = [line.split() for line in printed["stridor modes brake.toml"].splitlines() if "  unstable" in line]
     assert [words[1] for words in growing] == ["8667.05"]
@@ -43,13 +43,15 @@ def test_what_the_text_says(followed: tuple[Path, dict[str, str]]) -> None:
     for frequency in (50 - 100 / (2 * np.pi), 50 + 100 / (2 * np.pi)):
         assert f"{frequency:.4f}" in whirling
     complete = " ".join((DOCS / "tutorial-matrices.md").read_text(encoding="utf-8").split())
-    sentence = st.onsets(st.load(followed[0] / "squeal.toml")).completeness
+    onsets = followed.names["onsets"]
+    assert isinstance(onsets, Onsets)
+    sentence = onsets.completeness
     assert re.sub(r"\d+ unknowns", "", sentence) in re.sub(r"\d+ unknowns", "", complete)
 
 
 @pytest.mark.slow
-def test_both_ways_give_the_same(followed: tuple[Path, dict[str, str]]) -> None:
-    folder, _ = followed
+def test_both_ways_give_the_same(followed: Page) -> None:
+    folder = followed.folder
 
     def onsets(case: str | st.Case) -> np.ndarray:
         found = st.onsets(case if isinstance(case, st.Case) else st.load(folder / case)).onsets

@@ -230,8 +230,10 @@ class Call:
     def draw(self, figure: Figure, name: str) -> Path:
         """Save a figure in the folder, and say so."""
         from ..io.atomic import replacing
+        from ..view.style import lay_out
 
         path = self.folder / name
+        lay_out(figure)
         with replacing(path) as temporary:
             figure.savefig(temporary, dpi=150)
         self.say(f"written: {path}")

@@ -115,12 +115,10 @@ def _drawn(call: Call, result: StudyResult) -> tuple[list[Path], str]:
     from ..studies.page import write_page
     from ..studies.plots import study_figures
     from ..studies.summary import undrawn
-    from ..view.style import lay_out
 
     drawn = study_figures(result)
     files: list[Path] = []
     for name, figure in drawn.items():
-        lay_out(figure)
         files.append(call.draw(figure, f"{name}.png"))
     files.append(write_page(result, drawn, call.folder / "report.html"))
     call.say(f"written: {files[-1]}")
