@@ -12,6 +12,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import stridor as st
+from stridor.app.arguments import Call
 from stridor.case import template_text
 
 CUBE = """
@@ -94,3 +95,14 @@ def test_axes_that_are_given_keep_their_figure() -> None:
     ax = own.subplots()
     assert st.plot.model(st.loads(template_text("two-beams")), ax=ax) is own
     assert np.isfinite(ax.get_xlim()).all()
+
+
+def test_a_verb_draws_its_figure_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A figure that is not laid out yet is drawn in vain before."""
+    drawn: list[Figure] = []
+    draw = Figure.draw
+    monkeypatch.setattr(Figure, "draw", lambda self, renderer: drawn.append(self) or draw(self, renderer))
+    figure = st.plot.model(st.loads(template_text("two-beams")))
+    path = Call(tmp_path / "case.toml", tmp_path, None, None, json=False, quiet=True).draw(figure, "model.png")
+    assert path.read_bytes().startswith(PNG)
+    assert drawn == [figure]

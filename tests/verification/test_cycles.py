@@ -299,7 +299,7 @@ def test_motions_come_to_the_cycles_of_the_branch(slow_belt: Cycles):
 
 @pytest.fixture(scope="module")
 def fast_belt() -> Cycles:
-    return st.cycles(mode_coupling(DAMPED, 1.0), between=(0.1, 1.8), runs=0)
+    return st.cycles(mode_coupling(DAMPED, 1.0), between=(0.1, 1.8), points=30, runs=0)
 
 
 def test_an_unstable_cycle_lies_between_two_that_are_reached(fast_belt: Cycles):
