@@ -77,13 +77,12 @@ def _is_switch(value: Any) -> bool:
 
 
 def _all(test: Callable[[Any], bool]) -> Callable[[Any], bool]:
-    """Whether something is one of what a test takes, or a list of one or more of them."""
+    """Whether something is one of what a test takes, or a list of them."""
 
     def tested(value: Any) -> bool:
         if isinstance(value, str | Mapping | Iterator) or not isinstance(value, Iterable) or _is_single(value):
             return test(value)
-        values = list(cast("Iterable[Any]", value))
-        return bool(values) and all(test(v) for v in values)
+        return all(test(v) for v in cast("Iterable[Any]", value))
 
     return tested
 
@@ -108,7 +107,7 @@ PATH = Accepted(lambda value: isinstance(value, str | PathLike), "a path")
 TEXT = Accepted(lambda value: isinstance(value, str), "a text")
 NUMBER = Accepted(is_number, "a number")
 WHOLE = Accepted(_is_whole, "a whole number")
-NUMBERS = Accepted(_all(lambda value: is_number(_one(value))), "a number, or a list of at least one")
+NUMBERS = Accepted(_all(lambda value: is_number(_one(value))), "a number, or a list of numbers")
 PAIR = Accepted(
     lambda value: not isinstance(value, str | Mapping | Iterator)
     and isinstance(value, Iterable)

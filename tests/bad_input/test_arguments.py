@@ -148,7 +148,7 @@ RUN = st.simulate(CASE.with_({"phases": [{"name": "a", "duration": 1.0}]}))
         (lambda: st.cycles(CASE, between="abc"), "between: 'abc' – two numbers, or None"),
         (lambda: st.cycles(CASE, 0.5, points=None), "points: missing – a number"),
         (lambda: st.damping_map(CASE, None, "y", x_range=(0, 1), y_range=(0, 1)), "x: missing – a text"),
-        (lambda: st.ensemble(CASE, mu="abc"), "mu: 'abc' – a number, or a list of at least one"),
+        (lambda: st.ensemble(CASE, mu="abc"), "mu: 'abc' – a number, or a list of numbers"),
         (lambda: st.reduced_model(CASE, "abc"), "box: 'abc' – a table"),
         (lambda: st.compare(CASE, 0.5, kept=3), "kept: 3 – a store of finished parts"),
         (lambda: st.body_modes(CASE, max_frequency_hz=-1), "max_frequency_hz: -1 – a highest frequency"),
