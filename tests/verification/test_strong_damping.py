@@ -60,6 +60,33 @@ def test_modes_without_branches(damping: float, monkeypatch: pytest.MonkeyPatch)
         assert "branches were not followed: branches cannot be told apart" in found.completeness[row]
 
 
+@pytest.mark.parametrize("case", [bench(5e-7), bench(2e-6, (10, 30)).with_({"bodies.beam1.damping.stiffness": 0.0})])
+def test_modes_far_above_the_band_are_not_of_it_where_they_are_overdamped(case: st.Case) -> None:
+    """Half of the poles that no contact sees have no frequency; their rates are hundreds of thousands a second."""
+    true = dense(case, 0.3)
+    true = true[np.abs(true) <= 2 * np.pi * case.modal.max_frequency_hz]
+    assert np.all(true.imag > 0)
+    found = {source: st.modes(case.with_({"modal.source": source}), 0.3) for source in ("receptance", "krylov")}
+    for modes in found.values():
+        assert modes.total[0] == len(true) < case.modal.modes
+        values = modes.eigenvalues[0][modes.in_band[0]]
+        np.testing.assert_allclose(values[np.argsort(values.imag)], true[np.argsort(true.imag)], rtol=1e-7)
+    assert found["receptance"].branch.tolist() == found["krylov"].branch.tolist()
+    at_receptance, at_krylov = (st.onsets(case.with_({"modal.source": s}), (0.0, 0.6)) for s in found)
+    assert [o.branches for o in at_receptance.onsets] == [o.branches for o in at_krylov.onsets]
+
+
+def test_vibrations_are_listed_before_what_only_decays() -> None:
+    case = bench(1e-5).with_({"modal.modes": 3})
+    listed, every = st.modes(case, 0.3), st.modes(case, 0.3, max_frequency_hz=case.modal.max_frequency_hz)
+    true = dense(case, 0.3)
+    true = true[np.abs(true) <= 2 * np.pi * case.modal.max_frequency_hz]
+    assert every.total.tolist() == listed.total.tolist() == [len(true)]  # of conjugates one
+    assert (true.imag == 0).sum() > 3  # without a frequency: below all others
+    lowest = every.branch[every.eigenvalues[0].imag > 0][:3]
+    assert listed.branch.tolist() == lowest.tolist()
+
+
 def test_beyond_what_is_affordable_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Tracker, "advance", lost)
     monkeypatch.setattr(following, "WHOLE", 10)

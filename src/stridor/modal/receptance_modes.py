@@ -12,6 +12,7 @@ from ..system.uncoupled import uncoupled_modes
 from ..typing import Array, ComplexArray, IntArray
 from .backward_error import BackwardError
 from .coupling import PointCoupling, couple
+from .krylov.follow import FOLLOWED
 from .pencil import Pencil
 from .quadratic.inverse_iteration import solved_beside
 from .results import ComplexModes, Progress, at_each, require_memory
@@ -69,15 +70,16 @@ def modes_by_receptance(
     values, rows, planned = at_each(values, lambda at: tracker.advance(at).roots[: len(start)], progress)
     followed = np.array(rows)
     every = np.concatenate([start, fixed])
-    columns = np.argsort(np.abs(every.imag), kind="stable")
+    columns = in_order(every, limit)
     number = np.empty(len(columns), dtype=np.int64)
     number[columns] = np.arange(1, len(columns) + 1)
     if max_frequency_hz is None:
         columns = columns[:count]
     else:
-        top = 2 * np.pi * max_frequency_hz
         lowest = np.concatenate([followed.imag.min(axis=0), fixed.imag])
-        columns = columns[(every.imag[columns] <= top) | (np.abs(lowest[columns]) <= top)]
+        nearest = np.concatenate([np.minimum(np.abs(followed).min(axis=0), np.abs(start)), np.abs(fixed)])
+        inside = ((every.imag <= limit) | (np.abs(lowest) <= limit)) & (nearest <= FOLLOWED * limit)
+        columns = columns[inside[columns]]
     moving = np.flatnonzero(columns < len(start))
     still = np.flatnonzero(columns >= len(start))
     eigenvalues = np.empty((len(values), len(columns)), dtype=complex)
@@ -117,6 +119,12 @@ def modes_by_receptance(
         max_frequency_hz=max_frequency_hz,
         planned=planned,
     )
+
+
+def in_order(roots: ComplexArray, top: float) -> IntArray:
+    """Places (k,) of roots at μ = 0 in the order in which branches are numbered: by frequency, those whose |λ| is far
+    above the band's end top [1/s] last. Such are overdamped ones, too, which have no frequency at all."""
+    return np.lexsort((np.abs(roots.imag), np.abs(roots) > FOLLOWED * top))
 
 
 def _judge_fixed(judge: BackwardError, lam: ComplexArray, vectors: ComplexArray, mu: Array) -> Array:

@@ -23,7 +23,7 @@ from .newton import Root, crossing, exceptional, meeting, standstill
 from .onset import Branches, Onset, Onsets
 from .options import Options
 from .quadratic.inverse_iteration import null_vectors
-from .receptance_modes import prepare, unfit_words
+from .receptance_modes import in_order, prepare, unfit_words
 from .results import grows
 from .roots import ReceptanceProblem
 from .tolerances import BELIEVED, UNSTABLE_RELATIVE
@@ -91,7 +91,7 @@ def onsets_by_receptance(
     start = tracker.advance(low)
     before = len(events)
     end = tracker.advance(high)
-    order = _numbering(spectrum, tracker.origin)
+    order = _numbering(spectrum, tracker.origin, top)
     judge, family = BackwardError(coupling), _PointFamily(coupling, (0.0, high))
     passed = [
         (StabilityChange(event.mu, _concerned(event), _located(spectrum, family, judge, event, order, has_damping)), k)
@@ -113,7 +113,7 @@ def onsets_by_receptance(
             [c for c in changes if c.onset is not None and c.onset.mu >= low],
         ),
         unbalanced=_unbalanced([(c, events[k]) for c, k in passed if k >= before], start, end, top),
-        followed=(_numbered(start, spectrum, order), _numbered(end, spectrum, order)),
+        followed=(_numbered(start, spectrum, order, top), _numbered(end, spectrum, order, top)),
     )
 
 
@@ -139,12 +139,12 @@ class _PointFamily(Family):
         return float(pencil.backward_error(np.array([lam]), u, p)[0])
 
 
-def _numbered(state: RootState, spectrum: ReceptanceProblem, order: dict[int, int]) -> Branches:
+def _numbered(state: RootState, spectrum: ReceptanceProblem, order: dict[int, int], top: float) -> Branches:
     """Numbers and eigenvalues (b,) of the branches at one μ, twins in the lower half plane left out."""
     known = [k for k in range(len(state.roots)) if int(state.branch[k]) in order and state.roots[k].imag >= 0]
     numbers = [order[int(state.branch[k])] for k in known]
     fixed = sorted(set(range(1, len(order) + len(spectrum.fixed) + 1)) - set(order.values()))
-    unseen = spectrum.fixed[np.argsort(np.abs(spectrum.fixed.imag), kind="stable")]
+    unseen = spectrum.fixed[in_order(spectrum.fixed, top)]
     return np.array(numbers + fixed, dtype=np.int64), np.concatenate([state.roots[known], unseen])
 
 
@@ -196,10 +196,10 @@ def _concerned(event: _Event) -> tuple[int, ...]:
     return (event.branch, event.partner) if event.double and event.partner >= 0 else (event.branch,)
 
 
-def _numbering(spectrum: ReceptanceProblem, roots: ComplexArray) -> dict[int, int]:
+def _numbering(spectrum: ReceptanceProblem, roots: ComplexArray, top: float) -> dict[int, int]:
     """Tracked root → mode number from 1 by frequency at μ = 0, modes that no contact sees included."""
     everything = np.concatenate([roots, spectrum.fixed])
-    rank = np.argsort(np.argsort(np.abs(everything.imag), kind="stable"), kind="stable")
+    rank = np.argsort(in_order(everything, top), kind="stable")
     return {k: int(rank[k]) + 1 for k in range(len(roots))}
 
 

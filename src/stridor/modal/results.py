@@ -79,8 +79,10 @@ class ComplexModes(Rates, Tabular):
 
     @property
     def in_band(self) -> BoolArray:
-        """Whether a mode is known at a μ and of a frequency of the band (k, b)."""
+        """Whether a mode is known at a μ and of a frequency of the band (k, b). Of two real branches that have met, one
+        goes on with the conjugate of the other's λ: that is no mode beside it."""
         known = np.isfinite(self.eigenvalues)
+        known = known & (self.eigenvalues.imag >= -UNSTABLE_RELATIVE * np.abs(self.eigenvalues))
         if self.max_frequency_hz is not None:
             known = known & (self.frequency_hz <= self.max_frequency_hz * (1 + BORDER))
         return known if self.band_hz is None else known & self._within(*self.band_hz)
@@ -186,9 +188,15 @@ class ComplexModes(Rates, Tabular):
         )
 
     def lowest(self, count: int) -> ComplexModes:
-        """The ``count`` branches of lowest number, and every other one that is unstable in the band at some μ."""
+        """The ``count`` branches of lowest number, and every other one that is unstable in the band at some μ. What only
+        decays, within less than a period of the slowest vibration over 2π, comes last: of strong damping there is more
+        of that than of vibrations."""
         unstable = np.any(self.unstable & self.in_band, axis=0)
-        first = np.arange(len(self.branch)) < count
+        size, swings = np.abs(self.eigenvalues), np.any(self.eigenvalues.imag > 0, axis=0)
+        slowest = float(np.nanmin(size[:, swings], initial=np.inf))
+        decays = ~swings & np.all((self.eigenvalues.real < 0) & (size > slowest), axis=0)
+        first = np.zeros(len(self.branch), dtype=bool)
+        first[np.argsort(decays, kind="stable")[:count]] = True
         return replace(self.chosen(np.flatnonzero(first | unstable)), held=self.total)
 
     def between(self, low_hz: float, high_hz: float) -> ComplexModes:
