@@ -195,25 +195,22 @@ def steady_sliding(problem: Problem, mu: float | None = None) -> SurfaceSliding:
     """The equilibrium under load and friction that both approaches start from, node by node of every contact.
 
     mu replaces the friction coefficient of every contact that has friction. Where more than one set of a few contact
-    nodes is in equilibrium, a warning names the others. Raises AnalysisError where there is none.
+    nodes is in equilibrium, ``others`` has them and a warning names them: how many nodes of which contacts touch, and
+    the sum of their normal forces. Raises AnalysisError where there is none.
     """
     require_friction(mu)
     work = Workspace.of(problem)
     found, system = work.steady(mu), work.system(mu)
-    nodes = system.contact_nodes()
-    others = [
-        ", ".join(dict.fromkeys(nodes.names[k] for k in nodes.owner[active])) or "none"
-        for active in other_equilibria(system, found, mu)
-    ]
+    others = other_equilibria(system, found, mu)
     if mu is not None and work.one_for_all:
         found = replace(found, warnings=(*found.warnings, *work.one_for_all))
     if not others:
         return found
     said = (
-        f"there is more than one equilibrium at this friction: as well with {'; with '.join(others)} touching; which "
+        f"there is more than one equilibrium at this friction: as well with {'; with '.join(o.words for o in others)}; which "
         "it is depends on how load and friction came about"
     )
-    return replace(found, warnings=(*found.warnings, said))
+    return replace(found, warnings=(*found.warnings, said), others=tuple(others))
 
 
 @overload
