@@ -206,9 +206,10 @@ def steady_sliding(problem: Problem, mu: float | None = None) -> SurfaceSliding:
         found = replace(found, warnings=(*found.warnings, *work.one_for_all))
     if not others:
         return found
+    as_well = "; with ".join(other.words for other in others)
     said = (
-        f"there is more than one equilibrium at this friction: as well with {'; with '.join(o.words for o in others)}; which "
-        "it is depends on how load and friction came about"
+        f"there is more than one equilibrium at this friction: as well with {as_well}; which it is depends on how load "
+        "and friction came about"
     )
     return replace(found, warnings=(*found.warnings, said), others=tuple(others))
 
