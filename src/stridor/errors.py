@@ -49,6 +49,14 @@ class NotSlidingError(AnalysisError):
     """Nothing slides along any contact, whatever the friction coefficient: no support was given a velocity."""
 
 
+class NotReducibleError(AnalysisError):
+    """No model reduced over parameters takes the case; lacks: what of it, and why."""
+
+    def __init__(self, message: str, lacks: str) -> None:
+        super().__init__(message)
+        self.lacks = lacks
+
+
 class FollowingError(AnalysisError):
     """Branches of modes cannot be followed from μ = 0, or the basis that they are followed on does not settle: the
     eigenvalues at a μ do not depend on it."""

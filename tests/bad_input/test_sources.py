@@ -68,3 +68,47 @@ def test_results_say_which_it_was(tmp_path):
         found = st.modes(case.with_({"modal.source": name}), 0.1, max_frequency_hz=5e3)
         assert found.source == found.to_json()["source"] == name
     assert st.modes(case, 0.1, max_frequency_hz=5e3).source == "receptance"
+
+
+ON_FLOOR = {
+    "bodies.m": {"type": "mass", "mass": 0.05, "position": [0.0, 0.0]},
+    "bodies.floor": {
+        "type": "obstacle", "shape": "flat", "point": [0.0, 0.0], "normal": [0.0, 1.0],
+        "sliding": {"velocity": [1.0, 0.0]},
+    },
+    "springs.k1": {"between": ["m", "ground"], "stiffness": 1e5, "direction": [0.8, 0.6]},
+    "springs.k2": {"between": ["m", "ground"], "stiffness": 2e5, "direction": [-0.6, 0.8]},
+    "loads.p": {"at": "m", "force": [0.0, -50.0]},
+    "contacts.c": {
+        "slave": "m", "master": "floor", "stiffness": 2e5, "friction": {"law": "coulomb", "coefficient": 0.3},
+    },
+}  # fmt: skip
+
+
+def on_floor(**changes: object) -> st.Case:
+    tables: dict[str, dict[str, dict[str, object]]] = {}
+    for path, table in ON_FLOOR.items():
+        kind, name = path.split(".")
+        tables.setdefault(kind, {})[name] = dict(table)
+    return st.Case(**tables).with_(changes)
+
+
+def test_a_node_on_an_obstacle_is_not_called_contact_over_surfaces():
+    case = on_floor(**{"modal.source": "receptance"})
+    with pytest.raises(st.AnalysisError, match="source receptance: contact c is that of a node on a surface, not of a point"):
+        st.modes(case, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"contacts.c.cubic": 1e12}, r"contact stiffness that depends on the force \(contacts\.NAME\.cubic\)"),
+        ({"contacts.c.closed": True}, r"contacts that are kept closed \(contacts\.NAME\.closed\)"),
+        ({"springs.k1.cubic": 1e12}, r"springs whose stiffness depends on .* \(springs\.NAME\.cubic\)"),
+    ],
+)
+def test_onsets_along_a_number_say_themselves_what_they_do_not_take(change, told):
+    case = on_floor(**change)
+    said = f"^onsets along springs.k2.stiffness: onsets along a number do not take {told}; at one value at a time `stridor modes`"
+    with pytest.raises(st.AnalysisError, match=said):
+        st.onsets(case, along="springs.k2.stiffness", friction_range=(1e5, 2e5))

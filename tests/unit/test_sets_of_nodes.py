@@ -11,6 +11,7 @@ import pytest
 import scipy.sparse as sp
 
 import stridor as st
+from stridor.app.pictures import steady_document
 from stridor.contact.multipliers import OPEN, SLIP, STICK
 from stridor.errors import AnalysisError
 from stridor.sliding import history, points, surfaces
@@ -369,14 +370,15 @@ def test_other_sets_in_equilibrium_are_named() -> None:
         half = rng.normal(size=(4, 4))
         stiffness, force, mu = half @ half.T + 0.1 * np.eye(4), 3 * rng.normal(size=4), float(rng.uniform(0.5, 3.0))
         rows, tangents, gaps = rng.normal(size=(2, 4)), rng.normal(size=(2, 4)), rng.uniform(0, 0.2, 2)
-        right = set[str]()
+        right, pressed = set[str](), dict[str, tuple[float, list[str]]]()
         for on in ([], [0], [1], [0, 1]):
             off = [k for k in (0, 1) if k not in on]
             whole = stiffness + 5.0 * (rows[on] - mu * tangents[on]).T @ rows[on]
             u = np.linalg.solve(whole, force - 5.0 * (rows[on] - mu * tangents[on]).T @ gaps[on])
             gap = gaps + rows @ u
             if (gap[on] <= 0).all() and (gap[off] >= 0).all():
-                right.add(", ".join("AB"[k] for k in on) or "none")
+                right.add(name := ", ".join("AB"[k] for k in on) or "none")
+                pressed[name] = float(-5.0 * gap[on].sum()), ["AB"[k] for k in on]
         contacts = {
             "AB"[k]: {"normal": rows[k], "tangent": tangents[k], "gap": gaps[k], "stiffness": 5.0,
                       "friction": {"law": "coulomb", "coefficient": 0.3}}
@@ -391,6 +393,10 @@ def test_other_sets_in_equilibrium_are_named() -> None:
         told = [w for w in found.warnings if w.startswith("there is more than one equilibrium at this friction: as well ")]
         assert len(told) == (len(right) > 1)
         for other in right - {own}:
-            assert f"with {other} touching" in told[0] or f"with {other};" in told[0]
+            force, who = pressed[other]
+            assert f"with {other} touching ({len(who)} of 2 nodes, N = " in told[0]
+            (named,) = [o for o in steady_document(found)["others"] if o["contacts"] == who]
+            assert named["touching_nodes"] == len(who)
+            assert named["normal_force"] == pytest.approx(force, rel=1e-9)
         several += len(told)
     assert several > 3

@@ -176,6 +176,8 @@ def test_a_friction_without_steady_sliding_has_no_modes() -> None:
     assert not np.any(np.isfinite(found.eigenvalues[0]))
     assert np.any(np.isfinite(found.eigenvalues[1]))
     assert found.completeness[0].startswith("Not checked: steady sliding")
+    assert found.to_json()["unstable_modes"][0] is None
+    assert found.solved.tolist() == [False, True]
     (said,) = [note for note in found.notes if "nothing was solved" in note]
     assert float(said.split("μ = ")[1].split(" ")[0]) == pytest.approx(0.5, abs=0.01)
     with pytest.raises(st.AnalysisError):

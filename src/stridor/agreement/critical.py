@@ -186,7 +186,7 @@ def _without_change(
     """Ends of a bracket at which the motion in time does the same: do the modes say so too?"""
     found = modes_of_band(system, list(ends), 1.02 * limit, options=options)
     grow = [bool(np.any(row)) for row in found.unstable & (found.frequency_hz <= limit)]
-    if modal is not None and not grow[0] and grow[1]:
+    if modal is not None and found.solved.all() and not grow[0] and grow[1]:
         begins = f"by the modes growth begins at {measured(modal, 5)} between them"
         return Critical(modal, agrees=False, why=f"{error}; {begins}")
     return Critical(modal, why=str(error))

@@ -37,6 +37,7 @@ def of_modes(result: ComplexModes, mu: str | None, *, drawn: bool = True, rubs: 
     """How many are unstable and which is the fastest; then its shape (the report, where the model has none to be
     drawn), or where growth begins (the report, where nothing depends on friction: rubs). mu: as the user gave it."""
     from ..modal.growing import doubt
+    from .show_modes import without
 
     growing = result.unstable & result.in_band
     rate = np.where(growing, result.growth_rate, -np.inf)
@@ -44,12 +45,15 @@ def of_modes(result: ComplexModes, mu: str | None, *, drawn: bool = True, rubs: 
     caution = "; not all of it was checked, see above" if unsure else ""
     if len(result.mu) > 1:
         some = growing.any(axis=1)
-        sentence = f"unstable modes at {int(some.sum()) or 'none'} of {len(result.mu)} friction coefficients"
+        # Where there is no steady sliding nothing is stable or unstable: those μ are not counted.
+        known = int(np.count_nonzero(result.solved))
+        sentence = f"unstable modes at {int(some.sum()) or 'none'} of {counted(known, 'friction coefficient')}"
         if some.any():
             row, b = (int(k) for k in np.unravel_index(int(rate.argmax()), rate.shape))
             first = float(result.mu[some].min())
             top = fastest(float(result.frequency_hz[row, b]), float(rate[row, b]))
             sentence += f", the lowest {first:g}; the fastest at μ = {result.mu[row]:g}: {top}"
+        sentence += without(result)
         return Conclusion(sentence + caution, "onsets" if rubs else "report")
     band = "" if result.max_frequency_hz is None else f" up to {result.max_frequency_hz:g} Hz"
     band = " from {:g} to {:g} Hz".format(*result.band_hz) if result.band_hz is not None else band

@@ -200,4 +200,5 @@ def steady_document(steady: SurfaceSliding) -> dict[str, Any]:
         "force_error": float(steady.balance.force_error),
         "moment_error": float(steady.balance.moment_error),
         "iterations": steady.iterations,
+        **({"others": [other.to_json() for other in steady.others]} if steady.others else {}),
     }

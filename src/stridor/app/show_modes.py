@@ -47,7 +47,7 @@ def show_modes(
         peak = int(np.argmax(growing))
         stdout.print(
             f"{len(result.mu)} friction coefficients, first and last shown, all in the file; most modes grow at "
-            f"μ = {result.mu[peak]:g}: {int(growing[peak])}",
+            f"μ = {result.mu[peak]:g}: {int(growing[peak])}{without(result)}",
         )
         for said in dict.fromkeys(result.completeness[1:-1]):
             at = [k for k in range(1, len(result.mu) - 1) if result.completeness[k] == said]
@@ -69,8 +69,19 @@ def _mode(result: ComplexModes, row: int, b: int) -> list[str]:
     ]
 
 
+def without(result: ComplexModes) -> str:
+    """At how many of the μ nothing was solved, as the end of a sentence on the others; "" where all were."""
+    none = result.mu[~result.solved]
+    if not len(none):
+        return ""
+    where = f"at μ = {none[0]:g}" if len(none) == 1 else f"at {len(none)} others, the lowest {none.min():g},"
+    return f"; {where} nothing was solved"
+
+
 def _listed(result: ComplexModes, row: int, shown: int, *, unstable: bool) -> str:
     """How many are listed, as in "20 of 276 modes listed; 3 unstable": those are always among them."""
+    if not result.solved[row]:
+        return "nothing solved: there is no steady sliding at this μ"
     total, growing = int(result.total[row]), int(np.count_nonzero(result.unstable[row] & result.in_band[row]))
     band = "" if result.max_frequency_hz is None else f" up to {result.max_frequency_hz:g} Hz"
     beyond = ""

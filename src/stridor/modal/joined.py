@@ -84,6 +84,7 @@ def rows_of(modes: ComplexModes, rows: Sequence[int]) -> ComplexModes:
         left=None if modes.left is None else modes.left[chosen],
         completeness=tuple(modes.completeness[k] for k in rows) if modes.completeness else (),
         held=None if modes.held is None else modes.held[chosen],
+        unsolved=None if modes.unsolved is None else modes.unsolved[chosen],
     )  # fmt: skip
 
 

@@ -42,22 +42,27 @@ def modes_of_band(
     options: Options | None = None,
     progress: Progress | None = None,
     numbered_at: float = 0.0,
+    check: bool = True,
+    residuals: bool = True,
 ) -> ComplexModes:
     """Every mode of a band at the friction coefficients ``mu``, as `complex_modes` follows them and `checked_modes`
     completes them, each with the nodes that touch at its μ. Whatever says something about which modes grow takes this
-    list. At a μ where there is no steady sliding among others where there is, all is NaN. Raises as `complex_modes`."""
+    list; check=False leaves `checked_modes` out, and nothing else. At a μ where there is no steady sliding among others
+    where there is, all is NaN (`ComplexModes.unsolved`). Raises as `complex_modes`."""
     options = options or Options()
     values = np.atleast_1d(np.asarray(mu, dtype=float))
 
     def followed(held: System, at: Array, tell: Progress | None) -> ComplexModes:
         return complex_modes(
-            held, at, max_frequency_hz=max_frequency_hz, damped=damped, vectors=vectors,
+            held, at, max_frequency_hz=max_frequency_hz, damped=damped, vectors=vectors, residuals=residuals,
             progress=tell, numbered_at=numbered_at, **asdict(options),
         )  # fmt: skip
 
     def checked(held: System, found: ComplexModes) -> ComplexModes:
         # Matrices without structure are solved in full as it is, and say what speaks for that.
-        return found if found.completeness else checked_modes(held, found, max_frequency_hz, own=own, options=options)
+        if found.completeness or not check:
+            return found
+        return checked_modes(held, found, max_frequency_hz, own=own, options=options)
 
     if len(values) < 2 or not (np.all(np.isfinite(values)) and np.all(values >= 0)):
         return checked(system, followed(system, values, progress))
@@ -144,7 +149,13 @@ def _with_empty(modes: ComplexModes, values: Array, parts: list[tuple[Stretch, I
         result[solid] = block
         return result
 
-    told = dict(zip(solid, modes.completeness or ("",) * len(solid), strict=True))
+    told = dict(zip(solid, modes.completeness, strict=False)) | {k: f"{UNCHECKED}: {why}." for k, why in empty.items()}
+    unsolved = np.isin(np.arange(len(values)), list(empty))
+    notes: list[str] = []
+    for why in dict.fromkeys(empty.values()) if not modes.completeness else ():
+        if not any(why in note for note in modes.notes):  # `stretch_words` names ranges, not a single μ without any
+            where = ", ".join(f"{values[k]:g}" for k in empty if empty[k] == why)
+            notes.append(f"At μ = {where} nothing was solved: {why}.")
     return replace(
         modes,
         mu=values,
@@ -152,7 +163,9 @@ def _with_empty(modes: ComplexModes, values: Array, parts: list[tuple[Stretch, I
         residual=wide(modes.residual + 0j).real,
         right=None if modes.right is None else wide(modes.right),
         left=None if modes.left is None else wide(modes.left),
-        completeness=tuple(told.get(k) or f"{UNCHECKED}: {empty[k]}." for k in range(len(values))),
+        completeness=tuple(told[k] for k in range(len(values))) if modes.completeness else (),
+        unsolved=unsolved,
+        notes=(*modes.notes, *notes),
     )
 
 

@@ -24,6 +24,6 @@ class Rates:
 
     @property
     def damping_ratio(self) -> Array:
-        """−Re λ/|λ|."""
+        """−Re λ/|λ|; 0 of λ = 0, NaN where λ is not known."""
         size = np.abs(self.eigenvalues)
-        return -np.divide(self.eigenvalues.real, size, out=np.zeros_like(size), where=size > 0)
+        return -np.divide(self.eigenvalues.real, size, out=np.zeros_like(size), where=size != 0)

@@ -42,7 +42,9 @@ class ComplexModes(Rates, Tabular):
     were asked for, where it was interrupted before the last. contact_state: where contacts may stick, how many nodes
     stick, slip and are open, and at which μ; they do so at every μ of the list. source: where the eigenpairs come from,
     a name of `modal.source`. band_hz: the frequencies asked for (`between`), None for all, and unstable_outside (k,):
-    how many modes up to max_frequency_hz grow at each μ at other ones.
+    how many modes up to max_frequency_hz grow at each μ at other ones. unsolved (k,): at which μ nothing was solved, as
+    there is no steady sliding (None: at none of them); their rows are NaN, and neither stable nor unstable: `unstable`
+    and `total` count no mode there, which says nothing of them.
     """
 
     mu: Array
@@ -63,10 +65,11 @@ class ComplexModes(Rates, Tabular):
     source: str = ""
     band_hz: tuple[float, float] | None = None
     unstable_outside: IntArray | None = None
+    unsolved: BoolArray | None = None
 
     @property
     def unstable(self) -> BoolArray:
-        """Whether Re λ > 0 beyond rounding (k, b)."""
+        """Whether Re λ > 0 beyond rounding (k, b); False as well where λ is not known (`solved`)."""
         return grows(self.eigenvalues, self._top)
 
     @property
@@ -94,6 +97,15 @@ class ComplexModes(Rates, Tabular):
     def total(self) -> IntArray:
         """How many modes of the band there are at each μ (k,), kept here or not."""
         return self.in_band.sum(axis=1) if self.held is None else self.held
+
+    @property
+    def solved(self) -> BoolArray:
+        """At which μ (k,) modes were solved: at the others nothing is said of what grows."""
+        return np.ones(len(self.mu), dtype=np.bool_) if self.unsolved is None else ~self.unsolved
+
+    def counts(self, numbers: IntArray) -> list[int | None]:
+        """How many at each μ (k,), None where nothing was solved."""
+        return [int(n) if known else None for n, known in zip(numbers, self.solved, strict=True)]
 
     @property
     def interrupted(self) -> bool:
@@ -134,6 +146,8 @@ class ComplexModes(Rates, Tabular):
         at = f"at μ = {self.mu[0]:g}" if len(self.mu) == 1 else f"at {len(self.mu)} friction coefficients"
         if len(self.mu) > 1:
             at += f", {self.mu.min():g} to {self.mu.max():g}"
+        if none := int(np.count_nonzero(~self.solved)):
+            at += f", nothing solved at {none} of them"
         return f"{counted(len(self), 'mode')} {at}; {growing or 'none'} unstable"
 
     def _repr_html_(self) -> str:
@@ -153,7 +167,7 @@ class ComplexModes(Rates, Tabular):
         fastest = growth.argmax(axis=1) if marks.size else np.zeros(len(self.mu), dtype=np.int64)
         rows = [
             (
-                f"{mu:g}", self.total[k], int(marks[k].sum()),
+                f"{mu:g}", *((self.total[k], int(marks[k].sum())) if self.solved[k] else ("not solved", "")),
                 readable(self.frequency_hz[k, b]) if marks[k].any() else "",
                 readable(self.growth_rate[k, b], 4) if marks[k].any() else "",
             )
@@ -167,7 +181,7 @@ class ComplexModes(Rates, Tabular):
         """What a document says of the band where one was asked for."""
         if self.band_hz is None or self.unstable_outside is None:
             return {}
-        return {"band_hz": list(self.band_hz), "unstable_outside_band": self.unstable_outside.tolist()}
+        return {"band_hz": list(self.band_hz), "unstable_outside_band": self.counts(self.unstable_outside)}
 
     @property
     def _told(self) -> list[str]:
@@ -247,8 +261,8 @@ class ComplexModes(Rates, Tabular):
         return {
             "mu": [float(m) for m in self.mu],
             "modes": rows,
-            "unstable_modes": np.sum(marks & self.in_band, axis=1).tolist(),
-            "modes_in_band": self.total.tolist(),
+            "unstable_modes": self.counts(np.sum(marks & self.in_band, axis=1)),
+            "modes_in_band": self.counts(self.total),
             "max_frequency_hz": self.max_frequency_hz,
             **self._of_band,
             "damped": self.damped,

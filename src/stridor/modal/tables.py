@@ -27,6 +27,9 @@ def modes_dataset(result: ComplexModes) -> Any:
         "unstable": (pairs, result.unstable.astype(np.int8), {"units": "1"}),
         "residual": (pairs, result.residual, {"units": "1", "long_name": "componentwise backward error"}),
     }
+    if not result.solved.all():
+        told = "0: there is no steady sliding, nothing is known of what grows"
+        variables["solved"] = ("mu", result.solved.astype(np.int8), {"units": "1", "long_name": told})
     for name, vectors in (("right_vector", result.right), ("left_vector", result.left)):
         if vectors is not None:
             variables[name] = split((*pairs, "freedom"), vectors, {"units": "1"})
@@ -41,7 +44,7 @@ def modes_dataset(result: ComplexModes) -> Any:
     if result.notes:
         data.attrs["notes"] = json.dumps(result.notes)
     data.attrs["damped"] = int(result.damped)
-    data.attrs["modes_in_band"] = json.dumps([int(n) for n in result.total])
+    data.attrs["modes_in_band"] = json.dumps(result.counts(result.total))
     if result.max_frequency_hz is not None:
         data.attrs["max_frequency_hz"] = result.max_frequency_hz
     if result.band_hz is not None:

@@ -36,6 +36,30 @@ SIGN_CHANGES = 30
 STEADY = "steady sliding of nodes"
 
 
+@dataclass(frozen=True)
+class OtherEquilibrium:
+    """What else may be in equilibrium at the same friction: touching (m,), which nodes do, normal_force (m,) [N] in
+    compression. contacts: those with a node that touches, in order."""
+
+    touching: BoolArray
+    normal_force: Array
+    contacts: tuple[str, ...]
+
+    @property
+    def words(self) -> str:
+        """As in "c touching (3 of 5 nodes, N = 1200 N)"."""
+        count, force = int(np.count_nonzero(self.touching)), readable(float(self.normal_force.sum()), 4)
+        who = ", ".join(self.contacts) or "none"
+        return f"{who} touching ({count} of {counted(len(self.touching), 'node')}, N = {force} N)"
+
+    def to_json(self) -> dict[str, object]:
+        """An entry of ``others`` of `stridor steady --json`."""
+        return {
+            "contacts": list(self.contacts), "touching_nodes": int(np.count_nonzero(self.touching)),
+            "normal_force": float(self.normal_force.sum()),
+        }  # fmt: skip
+
+
 @dataclass(frozen=True, repr=False)
 class SurfaceSliding(Shown):
     """Equilibrium under friction of m contact nodes in d = 2 or 3 dimensions.
@@ -46,7 +70,8 @@ class SurfaceSliding(Shown):
     node carries load; friction_coefficient (m,); gap (m,) [m], negative by N/K_c where contact has a stiffness.
     residual: largest imbalance of a freedom over the largest force. iterations: sets of touching nodes tried.
     resultants: contact → Resultant; balance: loads against contact forces. warnings: where nodes open or press in a
-    pattern that no pressure explains.
+    pattern that no pressure explains. others: of a few nodes, the other equilibria at the same friction that
+    `st.steady_sliding` found.
 
     status (m,): OPEN 0, STICK 1 or SLIP 2. With load steps sense is that of the friction force where nodes slip without
     a slip velocity, and zero where they stick; travel (p,) [s] is how far the motions have run, in units of their
@@ -68,6 +93,7 @@ class SurfaceSliding(Shown):
     resultants: Mapping[str, Resultant] = field(default_factory=dict)
     balance: Balance = Balance(np.nan, np.nan)
     warnings: tuple[str, ...] = ()
+    others: tuple[OtherEquilibrium, ...] = ()
 
     @property
     def _line(self) -> str:
@@ -215,9 +241,9 @@ def steady_sliding_nodes(
     )
 
 
-def other_equilibria(system: System, found: SurfaceSliding, mu: float | None = None) -> list[BoolArray]:
-    """The other sets (m,) of touching nodes that are in equilibrium at the same friction, where all can be tried: of a
-    few nodes, without load steps."""
+def other_equilibria(system: System, found: SurfaceSliding, mu: float | None = None) -> list[OtherEquilibrium]:
+    """The other sets of touching nodes that are in equilibrium at the same friction, where all can be tried: of a few
+    nodes, without load steps."""
     nodes = system.contact_nodes()
     free = np.flatnonzero(~nodes.kept)
     if system.load_steps or not 0 < len(free) <= ALL_TRIED:
@@ -225,8 +251,8 @@ def other_equilibria(system: System, found: SurfaceSliding, mu: float | None = N
     return system.once(("other equilibria", mu), lambda: _others(system, found, mu, free))
 
 
-def _others(system: System, found: SurfaceSliding, mu: float | None, free: IntArray) -> list[BoolArray]:
-    others = list[BoolArray]()
+def _others(system: System, found: SurfaceSliding, mu: float | None, free: IntArray) -> list[OtherEquilibrium]:
+    others, nodes = list[OtherEquilibrium](), system.contact_nodes()
     for active in sets_near(found.active, free):
         if np.array_equal(active, found.active):
             continue
@@ -238,7 +264,8 @@ def _others(system: System, found: SurfaceSliding, mu: float | None, free: IntAr
         # One that differs in contacts without force and gap is the same.
         pushes = force[own] > 1e-9 * np.abs(force).max(initial=0.0)
         if pushes.all() and np.all(gap[~own] > 1e-9 * np.abs(gap).max(initial=0.0)):
-            others.append(active)
+            names = tuple(dict.fromkeys(nodes.names[k] for k in nodes.owner[active]))
+            others.append(OtherEquilibrium(active, held.normal_force, names))
     return others
 
 

@@ -7,7 +7,7 @@ import time
 
 from ..case import Case
 from ..case.matrix_checks import MU
-from ..errors import AnalysisError, CaseError
+from ..errors import AnalysisError, CaseError, NotReducibleError
 from ..modal.full import ParametricOnsets
 from ..modal.full import onsets_along as sought
 from ..modal.full.along_stretches import Part, joined_along
@@ -54,7 +54,14 @@ def _in_stretches(
     for stretch in solid:
         held_at = {} if stretch.at is None else {name: stretch.at}
         box = {name: (stretch.low, stretch.high)}
-        model = searched_model(case, box, max_frequency_hz=max_frequency_hz, held_at=held_at)
+        try:
+            model = searched_model(case, box, max_frequency_hz=max_frequency_hz, held_at=held_at)
+        except NotReducibleError as error:
+            # Nobody asked for a reduced model: what is refused is onsets along a number.
+            raise AnalysisError(
+                f"onsets along {name}: onsets along a number do not take {error.lacks}; at one value at a time "
+                "`stridor modes`, `onsets` over μ and `simulate` do"
+            ) from error
         parts.append(Part(stretch, model, sought(model, name, solver=solver)))
     words = stretch_words(over, "μ" if name == MU else name)
     if len(over) == 1 and parts[0].stretch.at is None:

@@ -19,7 +19,7 @@ from ..asking import FUNCTION, NUMBER, NUMBERS, SWITCH, SWITCH_OR_NONE, takes
 from ..case.matrix_checks import MU
 from ..errors import AnalysisError, CaseError
 from ..errors import Problem as Wrong
-from ..modal.complex_modes import ComplexModes, complex_modes
+from ..modal.complex_modes import ComplexModes
 from ..modal.full import ParametricOnsets, full_modes, full_onsets
 from ..modal.onsets import Onsets
 from ..modal.onsets import onsets as solve_onsets
@@ -88,10 +88,12 @@ def modes(
     All modes with frequencies up to modal.max_frequency_hz are found; kept are the ``count`` lowest (default
     modal.modes) and every unstable one, with max_frequency_hz all up to that. band_hz: of all found, those between two
     frequencies, under the same numbers; without ``count`` every one of them. check: whether what grows in the band is
-    sought anew in the full problem (`checked_modes`). residuals=False, where nothing is checked, leaves backward errors
-    out where they cost something: for pictures (`ComplexModes.residual`). progress is called with the number of
-    friction coefficients done and of all. A workspace keeps the modes, with vectors those at one μ. Raises CaseError
-    for a bad μ, AnalysisError where the steady sliding state does not exist.
+    sought anew in the full problem (`checked_modes`), which decides nothing else: with it and without, each of several
+    μ has the nodes that touch there, and NaN where there is no steady sliding (`ComplexModes.solved`). residuals=False,
+    where nothing is checked, leaves backward errors out where they cost something: for pictures
+    (`ComplexModes.residual`). progress is called with the number of friction coefficients done and of all. A workspace
+    keeps the modes, with vectors those at one μ. Raises CaseError for a bad μ, AnalysisError where the steady sliding
+    state exists at none of them.
     """
     require_friction(mu)
     require_frequency(max_frequency_hz)
@@ -150,19 +152,15 @@ def _modes(
         notes = _held_by_factors(work, own)
     else:
         system = work.system() if in_proportion is None else in_proportion
+        own = work.own_friction if work.has_contacts and in_proportion is None else None
+        result = modes_of_band(
+            system, values, band, damped=damped, vectors=vectors, own=own, options=options, progress=progress,
+            check=check, residuals=residuals,
+        )  # fmt: skip
+        notes = taken_as_closed(system)
         if check:
-            own = work.own_friction if work.has_contacts and in_proportion is None else None
-            result = modes_of_band(
-                system, values, band, damped=damped, vectors=vectors, own=own, options=options, progress=progress
-            )
             single = float(result.mu[0]) if len(result.mu) == 1 else None
-            notes = (*taken_as_closed(system), *decided_by_meshes(system, single, options.solver))
-        else:
-            result = complex_modes(
-                system, values, max_frequency_hz=band, damped=damped, vectors=vectors, residuals=residuals,
-                progress=progress, **asdict(options),
-            )  # fmt: skip
-            notes = taken_as_closed(system)
+            notes = (*notes, *decided_by_meshes(system, single, options.solver))
         notes = (*notes, *system.tie_words)
     notes = (*notes, *(work.one_for_all if in_proportion is None else _said_of_own(work)))
     made = provenance(work, "modes", time.perf_counter() - started, damped=damped)
@@ -199,25 +197,23 @@ def steady_sliding(problem: Problem, mu: float | None = None) -> SurfaceSliding:
     """The equilibrium under load and friction that both approaches start from, node by node of every contact.
 
     mu replaces the friction coefficient of every contact that has friction. Where more than one set of a few contact
-    nodes is in equilibrium, a warning names the others. Raises AnalysisError where there is none.
+    nodes is in equilibrium, ``others`` has them and a warning names them: how many nodes of which contacts touch, and
+    the sum of their normal forces. Raises AnalysisError where there is none.
     """
     require_friction(mu, several=False)
     work = Workspace.of(problem)
     found, system = work.steady(mu), work.system(mu)
-    nodes = system.contact_nodes()
-    others = [
-        ", ".join(dict.fromkeys(nodes.names[k] for k in nodes.owner[active])) or "none"
-        for active in other_equilibria(system, found, mu)
-    ]
+    others = other_equilibria(system, found, mu)
     if mu is not None and work.one_for_all:
         found = replace(found, warnings=(*found.warnings, *work.one_for_all))
     if not others:
         return found
+    as_well = "; with ".join(other.words for other in others)
     said = (
-        f"there is more than one equilibrium at this friction: as well with {'; with '.join(others)} touching; which "
-        "it is depends on how load and friction came about"
+        f"there is more than one equilibrium at this friction: as well with {as_well}; which it is depends on how load "
+        "and friction came about"
     )
-    return replace(found, warnings=(*found.warnings, said))
+    return replace(found, warnings=(*found.warnings, said), others=tuple(others))
 
 
 @overload

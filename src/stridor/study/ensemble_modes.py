@@ -12,9 +12,9 @@ from ..errors import StridorError
 from ..modal.results import ComplexModes
 from ..sliding import slip_speeds
 from ..system import System
-from ..typing import Array, IntArray
+from ..typing import Array, BoolArray, IntArray
 from .analyses import modes
-from .ensemble_result import ModalMap
+from .ensemble_result import NOT_KNOWN, ModalMap
 from .workspace import Workspace
 
 SAME = 1e-12  # relative: coefficients of contacts that are one
@@ -53,7 +53,7 @@ class UnstableMap:
             return None
         i = int(np.argmin(np.abs(self.map.mu - mu)))
         j = int(np.argmin(np.abs(self.map.speed - speed)))
-        return self.growing[i][j]
+        return self.growing[i][j] if self.map.unstable[i, j] >= 0 else None
 
 
 def unstable_modes(work: Workspace, mus: Sequence[float], speeds: Sequence[float]) -> UnstableMap:
@@ -62,17 +62,23 @@ def unstable_modes(work: Workspace, mus: Sequence[float], speeds: Sequence[float
     constant = all(c.law.constant for c in system.contacts) and all(s.law.constant for s in system.surfaces)
     values, own = np.unique(mus), np.unique([1.0]) if constant else np.unique(speeds)
     columns: list[list[UnstableModes]] = []
+    solved: list[BoolArray] = []
+    notes: list[str] = []
     try:
         for speed in own:
             at_speed, friction = _at_speed(work, system, values, float(speed))
             found = modes(at_speed, mu=friction)
             columns.append([_growing(found, i) for i in range(len(values))])
+            solved.append(found.solved)
+            notes += [said for said, known in zip(found.completeness, found.solved, strict=False) if not known]
     except StridorError as error:
         return UnstableMap(None, (), (f"no modal map: {error}",))
     growing = tuple(tuple(column[i] for column in columns) for i in range(len(values)))
     count = np.array([[len(g.mode) for g in row] for row in growing], dtype=np.int64)
+    count[~np.column_stack(solved)] = NOT_KNOWN
     fastest = np.array([[_fastest(g) for g in row] for row in growing])
-    return UnstableMap(ModalMap(values, own, count, fastest[..., 0], fastest[..., 1]), growing, ())
+    told = tuple(f"modal map: {note}" for note in dict.fromkeys(notes))
+    return UnstableMap(ModalMap(values, own, count, fastest[..., 0], fastest[..., 1]), growing, told)
 
 
 def _at_speed(work: Workspace, system: System, mus: Array, speed: float) -> tuple[Workspace, Array]:

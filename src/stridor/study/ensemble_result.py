@@ -24,11 +24,14 @@ REGIMES = ("steady", "transient", "grows", "decays", "linear", "sticks", "still"
 UNITS = {"slip_speed": "m/s", "frequency_hz": "Hz", "growth_rate": "1/s", "mode_hz": "Hz", "perturbation": "m/s"}
 
 
+NOT_KNOWN = -1  # unstable modes where nothing was solved
+
+
 @dataclass(frozen=True)
 class ModalMap:
     """What the modal approach says over friction, at the speeds of an ensemble: mu (q,), speed (s,) factors; unstable
-    (q, s) how many modes grow; frequency_hz, growth_rate (q, s) of the fastest, NaN where none grows. Modes do not
-    depend on the speed where friction does not: s is then 1."""
+    (q, s) how many modes grow, NOT_KNOWN (−1) where there is no steady sliding; frequency_hz, growth_rate (q, s) of the
+    fastest, NaN where none grows. Modes do not depend on the speed where friction does not: s is then 1."""
 
     mu: Array
     speed: Array
@@ -41,7 +44,7 @@ class ModalMap:
         return {
             "mu": self.mu.tolist(),
             "speed": self.speed.tolist(),
-            "unstable": self.unstable.tolist(),
+            "unstable": [[None if n == NOT_KNOWN else n for n in row] for row in self.unstable.tolist()],
             "frequency_hz": [[_plain(v) for v in row] for row in self.frequency_hz],
             "growth_rate": [[_plain(v) for v in row] for row in self.growth_rate],
         }

@@ -111,6 +111,8 @@ def no_complete_basis(system: System, *, nodes: bool = False) -> str:
     if system.not_symmetric_definite:
         return system.not_symmetric_definite
     if system.surfaces and not nodes:
+        if all(s.nodes.count == 1 for s in system.surfaces):  # a mass on an obstacle is solved as a surface of one node
+            return f"contact {system.surfaces[0].name} is that of a node on a surface, not of a point on a beam"
         return "there is contact over surfaces"
     if system.load_steps:
         return "contacts may stick"

@@ -209,7 +209,8 @@ def _modal(left: Axes, right: Axes, result: Ensemble) -> None:
     for j, speed in enumerate(modal.speed):
         label = f"speed {speed:g}" if len(modal.speed) > 1 else None
         colour = COLOURS[j % len(COLOURS)]
-        left.plot(modal.mu, modal.unstable[:, j], "o-", color=colour, ms=4, label=label, drawstyle="steps-mid")
+        known = np.where(modal.unstable[:, j] >= 0, modal.unstable[:, j], np.nan)
+        left.plot(modal.mu, known, "o-", color=colour, ms=4, label=label, drawstyle="steps-mid")
         right.plot(modal.mu, modal.frequency_hz[:, j] / 1e3, "o", color=colour, ms=4, label=label)
     left.set_title("modes that grow")
     left.set_xlabel(NAMES["mu"])

@@ -213,6 +213,17 @@ def _friction_axis(ax: Axes, modes: ComplexModes) -> None:
     low, high = float(modes.mu.min()), float(modes.mu.max())
     if low < high:  # of one coefficient, however often, there is no axis to cut
         ax.set_xlim(low, high)
+    order = np.argsort(modes.mu, kind="stable")
+    mu, solved = modes.mu[order], modes.solved[order]
+    # Where there is no steady sliding: grey from the last μ with modes to the next, else it would look like no growth.
+    for at in np.flatnonzero(~solved):
+        ax.axvspan(mu[max(at - 1, 0)], mu[min(at + 1, len(mu) - 1)], color="0.92", linewidth=0, zorder=0)
+    if not solved.all():
+        middle = float(mu[~solved].mean())
+        ax.text(
+            middle, 0.98, "no steady sliding", transform=ax.get_xaxis_transform(), rotation=90, ha="center", va="top",
+            color="0.35", fontsize=8,
+        )  # fmt: skip
 
 
 def _mark_unstable(ax: Axes, mu: Array, values: Array, unstable: BoolArray) -> None:

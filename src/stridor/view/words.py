@@ -87,6 +87,8 @@ def _growing(inputs: ReportInputs) -> list[tuple[float, float]] | None:
         modes = near if abs(near.mu[near.at(inputs.mu)] - inputs.mu) < 1e-9 else None
     if modes is not None:
         row = 0 if inputs.mu is None else modes.at(inputs.mu)
+        if not modes.solved[row]:
+            return None
         chosen = modes.unstable[row] & (modes.frequency_hz[row] <= inputs.max_frequency_hz)
         pairs = zip(modes.frequency_hz[row][chosen], modes.growth_rate[row][chosen], strict=True)
         return [(float(f), float(g)) for f, g in pairs]

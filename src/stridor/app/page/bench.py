@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import CaseError, StridorError
+from ...errors import AnalysisError, CaseError, StridorError
 from ...modal.complex_modes import ComplexModes
 from ...modal.onsets import Onset, Onsets
 from ...study.analyses import modes, onsets
@@ -125,9 +125,15 @@ class Bench:
         work = model.work
         here = None
         if model.locus is None:
-            model.locus = self._swept(work, state.mu, send)
+            try:
+                model.locus = self._swept(work, state.mu, send)
+            except AnalysisError:
+                _modes_here(work, state.mu)  # without any steady sliding the page says why there is none at its μ
+                raise
             send("locus", locus_of(model.locus))
-            if state.mu in model.locus.mu:
+            if not model.locus.solved[model.locus.at(state.mu)]:
+                here = _modes_here(work, state.mu)  # which says why there are none
+            elif state.mu in model.locus.mu:
                 send("at", modes_at(model.locus, state.mu, checked=False))
             send("model", _described(model))
         else:

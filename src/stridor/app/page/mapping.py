@@ -101,10 +101,14 @@ def _counts(
             varied = case.with_({paths[1 - along]: value})
             if FRICTION in paths:
                 found = modes(varied, [p[along] for p in points], check=False)
-                numbers = np.count_nonzero(found.unstable & found.in_band, axis=1).tolist()
+                numbers = found.counts(np.count_nonzero(found.unstable & found.in_band, axis=1))
             else:
                 numbers = [_unstable(varied.with_({paths[along]: p[along]})) for p in points]
-            yield from ((p, int(n), "") for p, n in zip(points, numbers, strict=True))
+            # Without steady sliding there are no modes, and nothing that is stable.
+            yield from (
+                (p, UNKNOWN, "there is no steady sliding") if n is None else (p, n, "")
+                for p, n in zip(points, numbers, strict=True)
+            )
         except (CaseError, AnalysisError) as error:
             yield from ((p, UNKNOWN, str(error)) for p in points)
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ...errors import AnalysisError, CaseError
+from ...errors import CaseError, NotReducibleError
 from ...system import System
 from ...typing import BoolArray, Sparse
 from ..krylov.steady import contact_rows, refuse_stick, steadiness, touching_nodes
@@ -102,24 +102,27 @@ def contacts_problem(
         return ContactsProblem(interpolated_terms(family.structure_at, family.interpolated), family.parameters)
     refuse_stick(family.own, "reduced models over parameters")
     if nodes.kept.any():
-        raise AnalysisError(
+        raise NotReducibleError(
             "reduced models over parameters do not take contacts that are kept closed; leave out closed = true, or "
-            "take modes and onsets of the full problem"
-        )
+            "take modes and onsets of the full problem", "contacts that are kept closed (contacts.NAME.closed)",
+        )  # fmt: skip
     steady = touching_nodes(family.own, nodes, touching_at, options.solver)
     touching = np.flatnonzero(steady.active)
     if np.any(nodes.cubic[touching] > 0):
-        raise AnalysisError(
+        lacks = "contact stiffness that depends on the force (contacts.NAME.cubic)"
+        raise NotReducibleError(
             "reduced models over parameters: contact stiffness is taken as constant, and contacts.NAME.cubic makes it "
-            "depend on the force; `stridor modes`, `onsets` and `simulate` take that"
-        )
+            "depend on the force; `stridor modes`, `onsets` over μ and `simulate` take that", lacks,
+        )  # fmt: skip
     layer = contact_rows(nodes, touching, steady.sense, steady.stuck)
     effects = steadiness(family.own, nodes, touching, options, layer)
     if effects.stretches:
-        raise AnalysisError(
+        lacks = "springs whose stiffness depends on how far steady sliding stretches them (springs.NAME.cubic)"
+        raise NotReducibleError(
             "reduced models over parameters: springs are taken as linear, and springs.NAME.cubic makes their stiffness "
-            "depend on how far steady sliding stretches them; `stridor modes`, `onsets` and `simulate` take that"
-        )
+            "depend on how far steady sliding stretches them; `stridor modes`, `onsets` over μ and `simulate` take "
+            "that", lacks,
+        )  # fmt: skip
     names = [p.name for p in family.parameters]
     rigid = nodes.compliance[touching] == 0.0
     if STIFFNESS in names and bool(rigid.all()):
