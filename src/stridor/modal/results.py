@@ -202,9 +202,9 @@ class ComplexModes(Rates, Tabular):
         )
 
     def lowest(self, count: int) -> ComplexModes:
-        """The ``count`` branches of lowest number, and every other one that is unstable in the band at some μ. What only
-        decays, faster than the slowest vibration turns, comes last: of strong damping there is more of that than of
-        vibrations."""
+        """The ``count`` branches of lowest number, and every other one that is unstable in the band at some μ. What
+        only decays, faster than the slowest vibration turns, comes last: of strong damping there is more of that than
+        of vibrations."""
         unstable = np.any(self.unstable & self.in_band, axis=0)
         size, swings = np.abs(self.eigenvalues), np.any(self.eigenvalues.imag > 0, axis=0)
         slowest = float(np.nanmin(size[:, swings], initial=np.inf))
