@@ -82,6 +82,7 @@ def test_countermeasures_come_back_as_they_were(case: st.Case, tmp_path: Path, m
     back = st.open(st.save(found, tmp_path / "countermeasures.nc"))
     assert (back.to_json(), back.table()) == (found.to_json(), found.table())
     assert np.array_equal(back.eigenvalues, found.eigenvalues)
+    assert {type(m.kind) for m in back.measures} <= {str}
     for ours, theirs in zip(back.measures, found.measures, strict=True):
         assert np.array_equal(ours.predicted, theirs.predicted)
     assert st.loads(back.provenance["case"]) == case

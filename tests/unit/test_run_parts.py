@@ -221,6 +221,16 @@ def test_nothing_of_another_case_is_taken(tmp_path: Path) -> None:
     before = st.run(st.load(path), tmp_path / "out", **ask).everything
     assert st.run(st.load(path), tmp_path / "out", **ask).everything.taken == ("modes", "onsets")
 
+    # Of a name of which only some parts are there, the document says which.
+    (gone,) = (tmp_path / "out" / "parts").glob("modes-at-*")
+    gone.unlink()
+    document = st.run(st.load(path), tmp_path / "out", **ask).to_json()
+    assert document["taken"] == ["modes", "onsets"]
+    assert "at μ = 0.3" not in document["taken_parts"]["modes"]
+    assert len(document["taken_parts"]["modes"]) == 3
+    assert document["taken_parts"]["onsets"] == ["damped"]
+    assert list(document["seconds"]) == ["check", "modes"]
+
     # Another number of the case.
     other = written(tmp_path, text=TEXT.replace("0.3", "0.31"))
     said: list[str] = []

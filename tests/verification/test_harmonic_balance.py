@@ -163,6 +163,11 @@ def test_a_branch_in_harmonics(slow_belt: Cycles):
     first = next(c for c in slow_belt.cycles if "stick" in c.kinds)
     assert first.harmonics == stick.harmonics
     assert first.shares[0, 1] >= 1 / first.harmonics
+    # Those without any stick may have a shorter one, and say so.
+    without = [c for c in slow_belt.cycles if c.shares[0, 1] == 0.0]
+    assert without[0].untold_share == 1 / without[0].harmonics == without[0].to_json()["untold_share"]
+    longest = 100 * max(c.untold_share for c in without)
+    assert slow_belt.sentence.endswith(f"; sticks shorter than {longest:.2g} % of a period are not told (harmonic balance)")
     assert reversal.sentence.startswith(
         f"reversal of slip of 1/{reversal.harmonics} of the period, which {reversal.harmonics} harmonics tell, begins between"
     )

@@ -101,6 +101,7 @@ class Outcome(Shown):
             "unsaturated": None if e.unsaturated is None else e.unsaturated.to_json(),
             "seconds": dict(e.seconds),
             "taken": list(e.taken),
+            "taken_parts": {name: list(what) for name, what in e.taken_parts.items()},
             "notes": list(e.notes),
         }
 

@@ -104,6 +104,12 @@ class Cycle(Shown):
     own_off: float = float("nan")
 
     @property
+    def untold_share(self) -> float | None:
+        """Sticks, and slips beside them, that are shorter than this share of the period are not told, so that a share
+        of stick of 0 may be one of them: 1/h of h harmonics; None by shooting, which tells all."""
+        return 1.0 / self.harmonics if self.method == "harmonic" and self.harmonics else None
+
+    @property
     def frequency_hz(self) -> float:
         """1/period [Hz]."""
         return 1.0 / self.period
@@ -216,6 +222,7 @@ class Cycle(Shown):
             "reached_from": self.reached_from,
             "method": self.method,
             "harmonics": self.harmonics or None,
+            "untold_share": self.untold_share,
             "defect": self.defect if np.isfinite(self.defect) else None,
             "own_multiplier_off": self.own_off if np.isfinite(self.own_off) else None,
         }

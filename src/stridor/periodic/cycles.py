@@ -79,7 +79,15 @@ class Cycles(Tabular):
         count = [sum(c.stable is s for c in self.cycles) for s in (True, False, None)]
         said = [f"{n} {w}" for n, w in zip(count, ("stable", "unstable", "undecided"), strict=True) if n]
         on = f", {len(self.branches)} {'branch' if len(self.branches) == 1 else 'branches'}" if self.branches else ""
-        return f"{counted(len(self.cycles), 'limit cycle')} at {over}: {', '.join(said)}{on}"
+        return f"{counted(len(self.cycles), 'limit cycle')} at {over}: {', '.join(said)}{on}{self._untold}"
+
+    @property
+    def _untold(self) -> str:
+        """Which sticks may be there though no stick is listed; "" of shooting, and where all contacts stick."""
+        shares = [c.untold_share for c in self.cycles if c.untold_share and not np.all(c.shares[:, 1] > 0.0)]
+        if not shares:
+            return ""
+        return f"; sticks shorter than {100 * max(shares):.2g} % of a period are not told (harmonic balance)"
 
     @property
     def warnings(self) -> tuple[str, ...]:

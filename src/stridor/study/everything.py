@@ -46,7 +46,8 @@ class Everything:
     source but receptance) there are no undamped sweeps, no curve and no operating shape. steady is the equilibrium,
     vector (n,) the mode that grows fastest (or decays slowest) and energy (m,) what friction feeds into it at each
     node. mu is the friction of the case and own the modes there, None where contacts have different coefficients.
-    taken: parts that came from an earlier call on the same case. unsaturated: of a run that still grows, whose loudest
+    taken: names under which something came from an earlier call on the same case, taken_parts what it was: the rest was
+    computed, or not asked for. unsaturated: of a run that still grows, whose loudest
     line is that of its start: it has no dominant frequency, and nothing of it is compared.
     """
 
@@ -79,6 +80,7 @@ class Everything:
     measures: Countermeasures | None = None
     unsaturated: Unsaturated | None = None
     taken: tuple[str, ...] = ()
+    taken_parts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 @dataclass
@@ -239,6 +241,7 @@ def compute_everything(
         measures=modal.measures,
         unsaturated=still,
         taken=tuple(clock.taken),
+        taken_parts={name: tuple(w for w in what if w) for name, what in clock.taken.items()},
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeVar, get_args
+from typing import Any, Literal, TypeVar, cast, get_args
 
 import numpy as np
 
@@ -241,7 +241,7 @@ class Countermeasures(Tabular):
             sizes: Any = {name: float(row[name]) for name in SIZES[1:]}
             measures.append(
                 Measure(
-                    kind=row["kind"],
+                    kind=cast(Kind, str(row["kind"])),  # arrays of texts hold NumPy's own
                     name=str(row["name"]),
                     direction=int(row["direction"]),
                     **sizes,

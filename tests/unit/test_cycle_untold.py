@@ -1,0 +1,37 @@
+"""What harmonic balance cannot tell of sticks is said beside the shares of stick."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from stridor.periodic.cycle import Cycle
+from stridor.periodic.cycles import Cycles
+
+
+def cycle(method: str, harmonics: int, stick: float) -> Cycle:
+    """A cycle of one contact, of which nothing but its method and its shares is known."""
+    blank = dict.fromkeys((f.name for f in fields(Cycle)), None)
+    given = {
+        "mu": 1.0, "period": 1.0, "multipliers": np.array([0.5]), "multiplied": True, "own_off": np.nan, "defect": 0.0, "changes": (),
+        "contact_names": ("a",),
+        "method": method, "harmonics": harmonics, "shares": np.array([[0.0, stick, 1.0 - stick]]), "status": np.full((2, 1), 2), "slip_velocity": np.ones((2, 1)),
+    }  # fmt: skip
+    return Cycle(**{**blank, **given})
+
+
+@pytest.mark.parametrize(
+    ("method", "harmonics", "stick", "share", "said"),
+    [
+        ("harmonic", 16, 0.0, 1 / 16, "; sticks shorter than 6.2 % of a period are not told (harmonic balance)"),
+        ("harmonic", 16, 0.3, 1 / 16, ""),
+        ("shooting", 0, 0.0, None, ""),
+    ],
+)
+def test_no_stick_by_harmonics_is_none_that_they_tell(method, harmonics, stick, share, said) -> None:
+    one = cycle(method, harmonics, stick)
+    assert one.untold_share == share
+    found = Cycles((one,), (), (), None)
+    assert found.sentence.split("stable", 1)[1] == said
