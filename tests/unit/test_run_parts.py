@@ -23,7 +23,7 @@ from rubbing_block import rubbing_block
 from stridor.errors import AnalysisError, CaseError
 from stridor.io.finished import FinishedParts
 from stridor.io.plain_values import of_plain, to_plain
-from stridor.study import analyses, modal_parts
+from stridor.study import analyses, cycles, modal_parts
 from stridor.study.case_key import case_key
 from stridor.study.parts import OF_REPORT, chosen_parts
 from undrawn import nothing_drawn
@@ -73,6 +73,7 @@ def no_pictures() -> Generator[None]:
 def nothing_computed(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Whoever computes a part of the modal approach fails."""
     made = pytest.MonkeyPatch()
+    made.setattr(cycles, "onsets", refuse)  # and so it is imported before others are: it would keep what they are now
     for name in ("modes", "onsets", "body_modes", "simulate", "friction_curve"):
         made.setattr(analyses, name, refuse)
     for name in ("sensitivities", "rank_countermeasures"):
