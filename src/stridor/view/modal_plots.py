@@ -215,14 +215,15 @@ def _friction_axis(ax: Axes, modes: ComplexModes) -> None:
         ax.set_xlim(low, high)
     order = np.argsort(modes.mu, kind="stable")
     mu, solved = modes.mu[order], modes.solved[order]
-    # Where there is no steady sliding: grey from the last μ with modes to the next, else it would look like no growth.
-    for at in np.flatnonzero(~solved):
-        ax.axvspan(mu[max(at - 1, 0)], mu[min(at + 1, len(mu) - 1)], color="0.92", linewidth=0, zorder=0)
-    if not solved.all():
-        middle = float(mu[~solved].mean())
+    # Grey from the last μ with modes to the next, else it would look like no growth; where between them steady sliding
+    # ends is not known here.
+    unsolved = np.flatnonzero(~solved)
+    for run in np.split(unsolved, np.flatnonzero(np.diff(unsolved) > 1) + 1) if len(unsolved) else ():
+        start, end = float(mu[max(run[0] - 1, 0)]), float(mu[min(run[-1] + 1, len(mu) - 1)])
+        ax.axvspan(start, end, color="0.92", linewidth=0, zorder=0)
         ax.text(
-            middle, 0.98, "no steady sliding", transform=ax.get_xaxis_transform(), rotation=90, ha="center", va="top",
-            color="0.35", fontsize=8,
+            (start + end) / 2, 0.98, "nothing solved", transform=ax.get_xaxis_transform(), rotation=90, ha="center",
+            va="top", color="0.35", fontsize=8,
         )  # fmt: skip
 
 
