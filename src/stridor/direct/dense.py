@@ -11,6 +11,9 @@ import scipy.linalg as sl
 
 from ..typing import Array, ComplexArray, IntArray
 
+REGULAR = 1e-11  # reciprocal condition, after equilibration, from which on a matrix is clearly regular
+SOLVED = 1e-14  # componentwise backward error of an answer to full precision
+
 
 def lu_factors(matrix: Any, *, check_finite: bool = True) -> tuple[Any, Any]:
     """What `scipy.linalg.lu_factor` gives, without a warning.
@@ -21,6 +24,22 @@ def lu_factors(matrix: Any, *, check_finite: bool = True) -> tuple[Any, Any]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sl.LinAlgWarning)
         return sl.lu_factor(matrix, check_finite=check_finite)
+
+
+def solved(matrix: Array, right: Array) -> Array | None:
+    """A⁻¹ b (n,) of a small real matrix, equilibrated and refined (LAPACK's gesvx). None where that is not an answer to
+    full precision of a matrix that is clearly regular: another way has to tell why."""
+    if not len(right):
+        return right
+    if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
+        return None
+    *_, solution, regularity, _, _, info = sl.lapack.dgesvx(matrix, right[:, None])
+    if info != 0 or not regularity > REGULAR:
+        return None
+    answer: Array = solution[:, 0]
+    # LAPACK's own bound is one where an unknown that nothing asks for is zero.
+    terms = np.abs(matrix) @ np.abs(answer) + np.abs(right)
+    return answer if np.all(np.abs(right - matrix @ answer) <= SOLVED * terms) else None
 
 
 @dataclass(frozen=True)

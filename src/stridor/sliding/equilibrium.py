@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 from typing import Any
 
@@ -16,6 +17,7 @@ from ..errors import AnalysisError
 from ..system import System
 from ..typing import Array, BoolArray, IntArray, Sparse
 from .prepared import Preparing
+from .small import Small
 
 # Contact springs stiffer than this, relative to the structure, would drown it in rounding if added to its matrix.
 CONDENSED = 1e3
@@ -88,6 +90,14 @@ class Equilibrium:
         if cubic is not None and travel is not None:
             self.stretched = self.stretched + cubic.rows.lift @ travel
 
+    @cached_property
+    def _small(self) -> Small | None:
+        return Small.of(self.system, self.nodes.normal, self.push)
+
+    @property
+    def _rows(self) -> Any:
+        return self.nodes.normal if self._small is None else self._small.normal
+
     def solve(self, active: BoolArray, start: Array | None = None) -> NodeEquilibrium:
         """The equilibrium with exactly these nodes touching, whichever the signs of gap and force.
 
@@ -101,14 +111,14 @@ class Equilibrium:
             if (found := self._by_prepared(active)) is not None:
                 return found
             u, normal = self._linear(active, None, None)
-            return NodeEquilibrium(active, u, normal, nodes.gap + nodes.normal @ u)
+            return NodeEquilibrium(active, u, normal, nodes.gap + self._rows @ u)
         for _ in range(NEWTON_STEPS):
             before = u
             tangent, extra = self._springs(before)
             self._contacts(before)
             u, normal = self._linear(active, tangent, extra)
             if self._converged(before, u, active):
-                return NodeEquilibrium(active, u, normal, nodes.gap + nodes.normal @ u)
+                return NodeEquilibrium(active, u, normal, nodes.gap + self._rows @ u)
         raise AnalysisError(
             "steady sliding: the springs beyond the linear find no equilibrium in "
             f"{NEWTON_STEPS} steps; check their coefficients (softening springs may have none)"
@@ -135,16 +145,20 @@ class Equilibrium:
         self.solved += 1
         return replace(state, residual=residual)
 
-    def _springs(self, u: Array) -> tuple[Sparse | None, Array | None]:
-        """Tangent (n, n) of the cubic springs at u, and the force (n,) that it misses; None where there are none."""
+    def _springs(self, u: Array) -> tuple[Sparse | Array | None, Array | None]:
+        """Tangent (n, n) of the cubic springs at u, dense where unknowns are few, and the force (n,) that it misses;
+        None where there are none."""
         cubic = self.system.cubic
         if cubic is None or not cubic.coefficient.size:
             return None, None
-        rows = cubic.rows.free
+        rows: Any = cubic.rows.free if self._small is None else self._small.springs
         own = rows @ u
         stretch = own + self.stretched
-        tangent = sp.csr_array(rows.T @ sp.diags_array(3 * cubic.coefficient * stretch**2) @ rows)
-        return tangent, rows.T @ (cubic.coefficient * stretch**2 * (3 * own - stretch))
+        weight = 3 * cubic.coefficient * stretch**2
+        missed = rows.T @ (cubic.coefficient * stretch**2 * (3 * own - stretch))
+        if self._small is not None:
+            return rows.T @ (weight[:, None] * rows), missed
+        return sp.csr_array(rows.T @ sp.diags_array(weight) @ rows), missed
 
     def _contacts(self, u: Array) -> None:
         """Compliance and gap of the tangent to p = kδ + k₃δ³ at the approach δ that u has."""
@@ -153,7 +167,7 @@ class Equilibrium:
         if not len(hardens):
             return
         stiffness, factor = 1.0 / nodes.compliance[hardens], nodes.cubic[hardens]
-        approach = -(nodes.gap[hardens] + nodes.normal[hardens] @ u)
+        approach = -(nodes.gap[hardens] + self._rows[hardens] @ u)
         approach = np.where(nodes.kept[hardens], approach, np.maximum(approach, 0.0))
         tangent = stiffness + 3 * factor * approach**2
         self.compliance, self.gap = nodes.compliance.copy(), nodes.gap.copy()
@@ -163,14 +177,15 @@ class Equilibrium:
 
     def _converged(self, before: Array, u: Array, active: BoolArray) -> bool:
         """Whether the ways of everything beyond the linear have stopped changing."""
-        cubic, nodes = self.system.cubic, self.nodes
+        cubic, nodes, small = self.system.cubic, self.nodes, self._small
         hardens = active & (nodes.cubic > 0)
-        parts = [] if cubic is None else [cubic.rows.free]
+        springs: Any = None if cubic is None else cubic.rows.free if small is None else small.springs
+        parts = [] if springs is None else [springs]
         if hardens.any():
-            parts.append(nodes.normal[np.flatnonzero(hardens)])
+            parts.append(self._rows[np.flatnonzero(hardens)])
         if not parts:
             return True
-        rows = sp.csr_array(sp.vstack(parts))
+        rows: Any = sp.csr_array(sp.vstack(parts)) if small is None else np.vstack(parts)
         moved, size = float(np.abs(rows @ (u - before)).max(initial=0.0)), float(np.abs(rows @ u).max(initial=0.0))
         return moved <= 1e-12 * size
 
@@ -187,39 +202,57 @@ class Equilibrium:
         imbalance = internal - self.force - self.push.T @ normal
         return float(np.abs(imbalance).max(initial=0.0) / max(float(terms.max(initial=0.0)), 1e-300))
 
-    def _linear(self, active: BoolArray, tangent: Sparse | None, extra: Array | None) -> tuple[Array, Array]:
+    def _linear(
+        self, active: BoolArray, tangent: Sparse | Array | None, extra: Array | None
+    ) -> tuple[Array, Array]:
         nodes, n = self.nodes, self.system.size
         springs, rigid = np.flatnonzero(active & self.condensed), np.flatnonzero(~self.condensed)
-        stiffness = self.system.stiffness if tangent is None else self.system.stiffness + tangent
         right = self.force if extra is None else self.force + extra
-        if len(springs):
-            spring = 1.0 / self.compliance[springs]
-            pushing = sp.csr_array(self.push[springs].T @ sp.diags_array(spring))
-            stiffness = stiffness + pushing @ nodes.normal[springs]
-            right = right - pushing @ self.gap[springs]
-        matrix: Any = stiffness
-        if len(rigid):
-            # Multipliers are scaled to the stiffness so that the bordered matrix is well balanced. Those of open nodes
-            # are kept at zero, so that matrices of other touching nodes have the same unknowns.
-            s, touches = self.scale, active[rigid]
-            held = sp.diags_array(np.where(touches, s, 0.0))
-            softness = sp.diags_array(np.where(touches, -self.compliance[rigid] * s * s, -s))
-            matrix = sp.block_array(
-                [[stiffness, -(held @ self.push[rigid]).T], [-held @ nodes.normal[rigid], softness]], format="csr"
-            )
-            right = np.concatenate([right, np.where(touches, s * self.gap[rigid], 0.0)])
+        spring = 1.0 / self.compliance[springs]
+        # Multipliers are scaled to the stiffness so that the bordered matrix is well balanced. Those of open nodes are
+        # kept at zero, so that matrices of other touching nodes have the same unknowns.
+        s, held = self.scale, active[rigid].astype(float)
+        softness = np.where(active[rigid], -self.compliance[rigid] * s * s, -s)
         self.solved += 1
+        answer = None
+        if self._small is not None:
+            answer = self._small.answer(tangent, right, (springs, spring), (rigid, held, softness), s, self.gap)
+        if answer is None:
+            answer = self._by_sparse(active, tangent, right, (springs, spring), (rigid, held, softness))
+        normal = np.zeros(nodes.count)
+        normal[rigid] = answer[n:] * s
+        if len(springs):
+            normal[springs] = -(self.gap[springs] + self._rows[springs] @ answer[:n]) * spring
+        return answer[:n], normal
+
+    def _by_sparse(
+        self, active: BoolArray, tangent: Sparse | Array | None, right: Array, springs: tuple[IntArray, Array],
+        rigid: tuple[IntArray, Array, Array],
+    ) -> Array:  # fmt: skip
+        """What `Small.answer` gives, by a sparse solver. Raises direct.SingularMatrix."""
+        nodes, s, (at, spring), (bordering, held, softness) = self.nodes, self.scale, springs, rigid
+        stiffness = self.system.stiffness if tangent is None else self.system.stiffness + sp.csr_array(tangent)
+        if len(at):
+            pushing = sp.csr_array(self.push[at].T @ sp.diags_array(spring))
+            stiffness = stiffness + pushing @ nodes.normal[at]
+            right = right - pushing @ self.gap[at]
+        matrix: Any = stiffness
+        if len(bordering):
+            scaled = sp.diags_array(held * s)
+            matrix = sp.block_array(
+                [
+                    [stiffness, -(scaled @ self.push[bordering]).T],
+                    [-scaled @ nodes.normal[bordering], sp.diags_array(softness)],
+                ],
+                format="csr",
+            )
+            right = np.concatenate([right, held * s * self.gap[bordering]])
         # Other matrices, with which factors may be shared, are regular or singular by themselves.
         kind = active.tobytes(), self.system.of_matrices.once("matrices", object)
-        answer = self.system.of_matrices.once(NEARBY, direct.Nearby).solve(
-            sp.csr_array(matrix), right, kind=kind, symmetric=self.symmetric, saddle=len(rigid) > 0,
+        return self.system.of_matrices.once(NEARBY, direct.Nearby).solve(
+            sp.csr_array(matrix), right, kind=kind, symmetric=self.symmetric, saddle=len(bordering) > 0,
             solver=self.solver,
         )  # fmt: skip
-        normal = np.zeros(nodes.count)
-        normal[rigid] = answer[n:] * self.scale
-        if len(springs):
-            normal[springs] = -(self.gap[springs] + nodes.normal[springs] @ answer[:n]) / self.compliance[springs]
-        return answer[:n], normal
 
 
 def share_factors(system: System, factors: direct.Nearby) -> None:

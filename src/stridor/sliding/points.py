@@ -9,16 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
+from ..direct.dense import solved
 from ..errors import AnalysisError
 from ..system import System
 from ..typing import Array, BoolArray
 from .equilibrium import FEW, sets_near, unsettled
 from .redundant import closed, redundant
+from .small import SMALL
 
 ROUNDING = 1e-12  # of the largest force, and of the largest gap or way towards it
 SIGNS = 6  # times at most that forces of contacts kept closed change their sign
@@ -235,25 +238,15 @@ def _solve(system: System, force: Array, mu: Array, sense: Array, active: BoolAr
     scale = float(np.abs(system.stiffness).max())
     with np.errstate(over="ignore"):
         softness = np.array([c.compliance for c in contacts]) * scale * scale
-    softness = np.diag(np.minimum(softness, SOFTEST))
+    softness = np.minimum(softness, SOFTEST)
     right = np.concatenate([force, [-c.gap * scale for c in contacts]])
-    with np.errstate(all="ignore"):
-        bordered = sp.block_array(
-            [
-                [system.stiffness, sp.csr_array(-push.T * scale)],
-                [sp.csr_array(normals * scale), sp.csr_array(softness)],
-            ],
-            format="csc",
-        )
-        try:
-            solver = spl.splu(bordered, permc_spec="COLAMD")
-            answer = solver.solve(right)
-            answer += solver.solve(right - bordered @ answer)
-        except RuntimeError:
-            answer = np.full(len(right), np.nan)
+    bordered, answer = _dense(system, normals * scale, push * scale, softness, right)
+    if answer is None:
+        bordered, answer = _sparse(system, normals * scale, push * scale, softness, right)
     size = system.size
-    terms = np.abs(bordered) @ np.abs(answer) + np.abs(right)
-    residual = float(np.abs(bordered @ answer - right).max() / max(terms.max(), 1e-300))
+    with np.errstate(all="ignore"):
+        terms = np.abs(bordered) @ np.abs(answer) + np.abs(right)
+        residual = float(np.abs(bordered @ answer - right).max() / max(terms.max(), 1e-300))
     if not np.isfinite(residual) or residual > 1e-8 or _loose(answer[:size], system):
         open_names = [c.name for k, c in enumerate(system.contacts) if not active[k]]
         reason = f"; contacts that would pull: {', '.join(open_names)}" if open_names else ""
@@ -264,6 +257,33 @@ def _solve(system: System, force: Array, mu: Array, sense: Array, active: BoolAr
     normal = np.zeros(len(system.contacts))
     normal[touching] = answer[size:] * scale
     return answer[:size], normal, residual
+
+
+def _dense(system: System, normal: Array, push: Array, softness: Array, right: Array) -> tuple[Any, Array | None]:
+    """The bordered matrix and the answer (n + m,), where it is small and clearly regular."""
+    n, size = system.size, len(right)
+    if size > SMALL:
+        return None, None
+    bordered = np.zeros((size, size))
+    bordered[:n, :n] = system.stiffness.toarray()
+    bordered[:n, n:], bordered[n:, :n] = -push.T, normal
+    bordered[range(n, size), range(n, size)] = softness
+    return bordered, solved(bordered, right)
+
+
+def _sparse(system: System, normal: Array, push: Array, softness: Array, right: Array) -> tuple[Any, Array]:
+    """The bordered matrix and the answer (n + m,), not finite where the matrix is singular."""
+    with np.errstate(all="ignore"):
+        bordered = sp.block_array(
+            [[system.stiffness, sp.csr_array(-push.T)], [sp.csr_array(normal), sp.csr_array(np.diag(softness))]],
+            format="csc",
+        )
+        try:
+            solver = spl.splu(bordered, permc_spec="COLAMD")
+            answer = solver.solve(right)
+            return bordered, answer + solver.solve(right - bordered @ answer)
+        except RuntimeError:
+            return bordered, np.full(len(right), np.nan)
 
 
 def _twice(system: System, active: BoolArray) -> str:

@@ -1,0 +1,107 @@
+"""Equilibria of few unknowns take another way than those of many: the equations hold on both, and what cannot be solved
+is told by the same words."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from stridor.direct import SingularMatrix
+from stridor.direct.dense import solved
+from stridor.sliding import small
+from stridor.sliding.equilibrium import ContactRows, Equilibrium
+from stridor.system.model import AnswerCache, CubicSprings, Rows
+
+
+def problem(seed: int, n: int = 7, m: int = 4) -> tuple[Equilibrium, np.ndarray]:
+    """A structure with rigid, elastic and hardening contact under friction, every other one with cubic springs, and
+    which nodes touch."""
+    rng = np.random.default_rng(seed)
+    half = rng.normal(size=(n, n))
+    stiffness = sp.csr_array(1e7 * (half @ half.T + np.eye(n)))
+    normal, tangent = rng.normal(size=(2, m, n))
+    compliance = np.array([0.0, 1e-8, 1e-9, 2e-8])
+    rows = ContactRows(
+        sp.csr_array(normal), 1e-6 * rng.normal(size=m), compliance, np.array([0.0, 0.0, 1e21, 0.0]), np.zeros(m, bool)
+    )
+    cubic = None
+    if seed % 2:
+        springs = Rows(sp.csr_array(rng.normal(size=(2, n))), np.zeros((2, 0)))
+        cubic = CubicSprings(springs, 1e18 * rng.uniform(size=2), 1e-6 * rng.normal(size=2))
+    system = SimpleNamespace(size=n, stiffness=stiffness, cubic=cubic, of_matrices=AnswerCache())
+    push = sp.csr_array(normal + 0.4 * tangent)
+    found = Equilibrium(system, rows, push, 10.0 * rng.normal(size=n), symmetric=False, solver=None)
+    return found, rng.random(m) < 0.7
+
+
+@pytest.mark.parametrize("most", [small.SMALL, -1])
+@pytest.mark.parametrize("seed", range(8))
+def test_the_equations_hold(seed: int, most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(small, "SMALL", most)
+    equilibrium, active = problem(seed)
+    state = equilibrium.solve(active)
+    nodes, system = equilibrium.nodes, equilibrium.system
+    u, p = state.displacement, state.normal_force
+    internal = system.stiffness @ u
+    if system.cubic is not None:
+        rows = system.cubic.rows.free
+        internal = internal + rows.T @ (system.cubic.coefficient * (rows @ u + system.cubic.stretch) ** 3)
+    assert np.abs(internal - equilibrium.push.T @ p - equilibrium.force).max() < 1e-11 * np.abs(equilibrium.force).max()
+    approach = -(nodes.gap + nodes.normal @ u)
+    elastic = nodes.compliance > 0
+    touches = active & elastic
+    law = approach[touches] / nodes.compliance[touches] + nodes.cubic[touches] * np.maximum(approach[touches], 0) ** 3
+    assert p[touches] == pytest.approx(law, rel=1e-9)
+    assert np.abs(approach[active & ~elastic]).max(initial=0.0) < 1e-9 * np.abs(u).max()
+    assert not p[~active].any()
+
+
+def test_both_ways_meet_and_only_many_unknowns_are_factorised(monkeypatch: pytest.MonkeyPatch) -> None:
+    equilibrium, active = problem(3)
+    few = equilibrium.solve(active)
+    assert equilibrium.system.of_matrices.known("factors nearby") is None
+    monkeypatch.setattr(small, "SMALL", -1)
+    other, _ = problem(3)
+    many = other.solve(active)
+    assert other.system.of_matrices.known("factors nearby") is not None
+    assert few.displacement == pytest.approx(many.displacement, rel=1e-11)
+    assert few.normal_force == pytest.approx(many.normal_force, rel=1e-10)
+
+
+@pytest.mark.parametrize("most", [small.SMALL, -1])
+def test_what_nothing_resists_is_told(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(small, "SMALL", most)
+    equilibrium, _ = problem(2)
+    free = equilibrium.system.stiffness.toarray()
+    free[:, 5] = free[5] = 0.0
+    equilibrium.system.stiffness = sp.csr_array(free)
+    with pytest.raises(SingularMatrix, match="row 5 is empty"):
+        equilibrium.solve(np.zeros(4, dtype=bool))
+    soft = np.diag([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
+    soft[5, 5] = soft[5, 6] = soft[6, 5] = 1.0
+    equilibrium.system.stiffness = sp.csr_array(soft)
+    del equilibrium._small  # of the stiffness before
+    with pytest.raises(SingularMatrix, match="the matrix is singular to working precision"):
+        equilibrium.solve(np.zeros(4, dtype=bool))
+
+
+@pytest.mark.parametrize(
+    ("matrix", "right"),
+    [
+        ([[1.0, 1.0], [1.0, 1.0]], [1.0, 2.0]),  # singular
+        ([[1.0, 1.0], [1.0, 1.0 + 1e-13]], [1.0, 2.0]),  # as good as that
+        ([[np.nan, 0.0], [0.0, 1.0]], [1.0, 2.0]),
+        ([[1.0, 0.0], [0.0, 1.0]], [np.inf, 2.0]),
+    ],
+)
+def test_a_doubtful_answer_is_none(matrix: list[list[float]], right: list[float]) -> None:
+    assert solved(np.array(matrix), np.array(right)) is None
+
+
+def test_rows_of_very_different_size_and_unknowns_that_stay_zero() -> None:
+    matrix = np.diag([1e-20, 1e20, 1.0]) + np.diag([0.5e-20, 0.3e20], 1)
+    answer = solved(matrix, np.array([1e-20, 1e20, 0.0]))
+    assert answer == pytest.approx([0.5, 1.0, 0.0])
