@@ -23,7 +23,7 @@ from stridor.io.matrix_files import FORMATS, Format, write_matrices
 from stridor.matrices import read_matrix
 from stridor.typing import Sparse
 
-FEW = ["bodies.beam1.elements=6", "bodies.beam2.elements=18"]
+FEW = ["bodies.beam1.elements=3", "bodies.beam2.elements=9"]
 SET_FEW = [word for item in FEW for word in ("--set", item)]
 SLOWING = 'contacts.A.friction={law="weakening", coefficient=0.1, static_coefficient=0.2, decay_speed=0.05}'
 
