@@ -6,6 +6,7 @@ documentation that is followed.
 from __future__ import annotations
 
 import contextlib
+import functools
 from collections.abc import Generator
 from pathlib import Path
 from typing import IO
@@ -13,6 +14,9 @@ from unittest import mock
 
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+from stridor.view import report
+from stridor.view.page_parts import ReportFigure
 
 
 def _written(_: Figure, target: str | Path | IO[bytes], **__: object) -> None:
@@ -29,4 +33,21 @@ def nothing_drawn() -> Generator[None]:
         mock.patch.object(Figure, "savefig", _written),
         mock.patch.object(ConstrainedLayoutEngine, "execute"),
     ):
+        yield
+
+
+@contextlib.contextmanager
+def drawn_alone(*names: str) -> Generator[None]:
+    """Of the figures of a report those with such names; the files of all others appear with nothing in them."""
+    sections = report.sections
+
+    def marked(inputs: report.ReportInputs) -> list[report.Chapter]:
+        chapters = sections(inputs)
+        for part in (p for chapter in chapters for p in chapter.parts):
+            if isinstance(part, ReportFigure) and part.name not in names:
+                part.figure.set_layout_engine(None)
+                part.figure.savefig = functools.partial(_written, part.figure)
+        return chapters
+
+    with mock.patch.object(report, "sections", marked):
         yield

@@ -8,8 +8,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
-import sys
 import time
 import urllib.error
 import urllib.request
@@ -20,6 +18,7 @@ import pytest
 from browsing import PATIENT, READY, SOLVED, WITH_BROWSER, expect, number, page_at, serving, shot, slide, wait
 
 import stridor as st
+from program import stridor
 from stridor.case import template_text
 
 pytest.importorskip("nicegui", reason="the extra app is not installed")
@@ -371,5 +370,5 @@ def test_a_signal_ends_it_with_its_processes_and_files_and_without_a_word(browse
 
 
 def test_a_case_that_is_none_is_refused_before_anything_is_served(tmp_path: Path):
-    done = subprocess.run([sys.executable, "-m", "stridor", "app", "none.toml"], capture_output=True, text=True, cwd=tmp_path)
+    done = stridor("app", "none.toml", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (2, "stridor: none.toml: no such file\n")

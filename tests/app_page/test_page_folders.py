@@ -28,6 +28,21 @@ def of_pages(folder: Path) -> set[Path]:
     return set(folder.glob(f"{PREFIX}*"))
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="whether a process is dead is not known there")
+def test_a_server_that_starts_takes_away_what_a_dead_one_left(temporary: Path):
+    with subprocess.Popen([sys.executable, "-c", ""]) as gone:
+        gone.wait()
+    left = temporary / f"{PREFIX}{Process(this_process().host, gone.pid, '1').mark}.x"
+    (left / "both").mkdir(parents=True)
+    alive = new_folder()
+    with serving() as (_, address):
+        urllib.request.urlopen(address).close()
+        assert not left.exists()
+        assert alive in of_pages(temporary)
+        assert len(of_pages(temporary)) == 2
+
+
+@pytest.mark.slow  # starts three servers
 @pytest.mark.skipif(sys.platform == "win32", reason="nobody is killed there")
 def test_the_folder_of_a_killed_server_goes_with_the_start_of_the_next(temporary: Path):
     with serving() as (alive, address):

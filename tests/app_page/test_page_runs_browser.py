@@ -19,7 +19,7 @@ pytestmark = WITH_BROWSER
 
 SHORT = {
     "bodies.beam1.elements": 6, "bodies.beam2.elements": 12, "temporal.step": 2e-7, "temporal.record_every": 5,
-    "phases.press.duration": 1e-3, "phases.slide.duration": 1e-2, "contacts.A.friction.coefficient": 0.3,
+    "phases.press.duration": 5e-4, "phases.slide.duration": 4e-3, "contacts.A.friction.coefficient": 0.3,
 }  # fmt: skip
 LONG = SHORT | {"phases.slide.duration": 300.0, "temporal.record_every": 2000}
 

@@ -14,6 +14,7 @@ import stridor as st
 from matrix_cases import matrix_case, rubbing
 from program import stridor
 from stridor.study.workspace import Workspace
+from undrawn import nothing_drawn
 
 pytestmark = pytest.mark.bad_input
 
@@ -132,11 +133,12 @@ def test_the_verbs_say_it_in_one_line(tmp_path: Path):
     assert done.stderr.startswith("stridor: simulate: factors of imported matrices depend on mu")
     assert done.stderr.count("\n") == 1
     # What is recommended works, and the commands that verbs end with too.
-    for verb in re.findall("`stridor ([a-z]+)`", done.stderr):
-        recommended = stridor(verb, "case.toml", cwd=tmp_path)
-        assert recommended.returncode == 0, recommended.stderr
-        _, _, following = recommended.stdout.partition("Next: stridor ")
-        assert stridor(*shlex.split(following), cwd=tmp_path).returncode == 0, following
+    with nothing_drawn():
+        for verb in re.findall("`stridor ([a-z]+)`", done.stderr):
+            recommended = stridor(verb, "case.toml", cwd=tmp_path)
+            assert recommended.returncode == 0, recommended.stderr
+            _, _, following = recommended.stdout.partition("Next: stridor ")
+            assert stridor(*shlex.split(following), cwd=tmp_path).returncode == 0, following
     done = stridor("onsets", "case.toml", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["onsets"][0]["mu"] == pytest.approx(0.75, rel=1e-12)

@@ -30,7 +30,11 @@ def follow(page: Path, folder: Path, *, slow: bool) -> Page:
     return Page(page, folder, slow).follow()
 
 
-LONG = {"boundaries"}  # weekly
+# Weekly: each takes seconds. The README and the tutorial are followed in each run, and so are all short pages.
+LONG = {
+    "api", "boundaries", "ensembles", "how-to", "limit-cycles", "other-programs", "pitfalls", "studies",
+    "tutorial-solids",
+}  # fmt: skip
 EACH_RUN = [pytest.param(page, marks=pytest.mark.slow) if page.stem in LONG else page for page in FOLLOWED]
 
 

@@ -16,6 +16,7 @@ import pytest
 import stridor as st
 from program import stridor
 from stridor.io import claims
+from undrawn import nothing_drawn
 
 # A coarse bench that runs in a second: few elements, large steps, short phases.
 COARSE = [
@@ -231,7 +232,8 @@ def test_run_writes_a_self_contained_report(folder: Path) -> None:
         "--set",
         "comparison.critical=false",
     ]
-    done = stridor("run", "two-beams.toml", "--json", *sets, cwd=folder)
+    with nothing_drawn():  # that pictures need nothing from elsewhere is tested of test_view_report's
+        done = stridor("run", "two-beams.toml", "--json", *sets, cwd=folder)
     data = document(done)
     assert set(data) >= {"modes", "onsets", "simulate", "compare", "report", "verdict"}
     report = (folder / data["report"]).read_text(encoding="utf-8")

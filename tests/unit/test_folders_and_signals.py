@@ -215,7 +215,7 @@ def test_sigterm_ends_a_run_like_ctrl_c(tmp_path: Path) -> None:
         second = stridor("modes", "case.toml", cwd=tmp_path)
         assert second.returncode == 2
         assert f"process {process.pid}" in second.stderr
-        time.sleep(2.0)
+        time.sleep(1.0)
         process.send_signal(signal.SIGTERM)
         _, log = process.communicate(timeout=120)
     assert process.returncode == 130, log

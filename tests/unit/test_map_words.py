@@ -136,9 +136,11 @@ def ensemble(mu: int, speed: int = 1, *, contacts: tuple[str, ...] = ("A",), swe
 
 
 SIZES = [
-    (1, 1, False), (6, 1, False), (6, 1, True), (40, 1, True), (6, 4, False), (6, 4, True),
-    pytest.param(12, 10, False, marks=pytest.mark.slow), pytest.param(20, 8, False, marks=pytest.mark.slow),
-    (32, 32, False),
+    (1, 1, False), (6, 1, True), (6, 4, True), (32, 32, False),
+    *(
+        pytest.param(*size, marks=pytest.mark.slow)
+        for size in ((6, 1, False), (40, 1, True), (6, 4, False), (12, 10, False), (20, 8, False))
+    ),
 ]  # fmt: skip
 
 

@@ -410,14 +410,14 @@ type = "solid"
 model = "3d"
 material = "steel"
 mass = "consistent"
-mesh = { shape = "block", corner = [-0.02, -0.02, -0.01], size = [0.04, 0.04, 0.01], divisions = [4, 4, 1], cells = "hexahedron" }
+mesh = { shape = "block", corner = [-0.02, -0.02, -0.01], size = [0.04, 0.04, 0.01], divisions = [3, 3, 1], cells = "hexahedron" }
 sliding = { velocity = [1.0, 0.2, 0.0] }
 [bodies.block]
 type = "solid"
 model = "3d"
 material = "pad"
 damping = { mass = 20.0, stiffness = 1e-8 }
-mesh = { shape = "block", corner = [-0.011, -0.011, 0.0], size = [0.022, 0.022, 0.01], divisions = [3, 3, 1], cells = "hexahedron" }
+mesh = { shape = "block", corner = [-0.011, -0.011, 0.0], size = [0.022, 0.022, 0.01], divisions = [2, 2, 1], cells = "hexahedron" }
 [bodies.plate]
 type = "solid"
 model = "3d"

@@ -28,6 +28,10 @@ COARSE = [
 ]  # fmt: skip
 DAMPING = "bodies.beam1.damping.stiffness", "bodies.beam2.damping.stiffness"
 MAP = ["--x", DAMPING[0], "--y", DAMPING[1], "--x-range", "1e-9:5e-8", "--y-range", "1e-9:5e-8", "--points", "9"]
+MESHES = (
+    "--set bodies.disc.mesh.divisions=[2,24,1] --set bodies.lining.mesh.divisions=[2,6,1] "
+    "--set bodies.plate.mesh.divisions=[2,6,1]"
+)
 NEXT = "Next: stridor "
 
 # What each verb ends with, and what it names as the next command.
@@ -35,6 +39,9 @@ ENDS = {
     "check two-beams.toml": ("time loop: modal path ", "onsets two-beams.toml"),
     "check pad-on-disc.toml": ("time loop: assembled path ", "onsets pad-on-disc.toml"),
     "steady pad-on-disc.toml": ("458 of 465 slave nodes touch, 0 stick and 458 slip; ", "modes pad-on-disc.toml"),
+    f"steady pad-on-disc.toml {MESHES}": (
+        "21 of 21 slave nodes touch, 0 stick and 21 slip; ", f"modes pad-on-disc.toml {MESHES}"
+    ),
     "modes two-beams.toml": (
         "1 of 19 modes up to 40000 Hz is unstable at μ = 0.1; the fastest 8641.12 Hz, +637.328 1/s",
         "shapes two-beams.toml --branch 8",
@@ -88,6 +95,10 @@ ENDS = {
         "1 of 3 curves bounds where nothing grows, down to ",
         f"modes two-beams.toml --set {DAMPING[0]}=1e-09 --mu 0.0766642",
     ),
+    f"boundary two-beams.toml --x {DAMPING[0]} --x-range 1e-9:5e-8 --y mu --y-range 0:0.2 --lines 2 --max-frequency 9e3": (
+        "one curve bounds where nothing grows, down to ",
+        f"modes two-beams.toml --set {DAMPING[0]}=1e-09 --mu 0.0766642 --max-frequency 9000",
+    ),
     "ensemble two-beams.toml --mu 0.3 --load 0.5,0.5 COARSE": (
         "2 members: ", "modes two-beams.toml --mu 0.3 COARSE"
     ),
@@ -131,7 +142,10 @@ def words_of(text: str) -> list[str]:
     return shlex.split(text.replace("COARSE", " ".join(COARSE)))
 
 
-LONG = "check pad-on-disc.toml", f"damping-map two-beams.toml {' '.join(MAP)}"
+LONG = (
+    "check pad-on-disc.toml", "steady pad-on-disc.toml", f"damping-map two-beams.toml {' '.join(MAP)}",
+    f"boundary two-beams.toml --x {DAMPING[0]} --x-range 1e-9:5e-8 --y mu --y-range 0:0.2 --lines 3",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("words", [pytest.param(w, marks=[pytest.mark.slow] if w in LONG else []) for w in ENDS])

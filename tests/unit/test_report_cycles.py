@@ -16,7 +16,7 @@ from stridor.periodic import Cycles
 from stridor.study.fingerprint import fingerprint, same_model
 from stridor.view.cycle_parts import cycle_table, cycle_words, loudest, worth_a_row
 from stridor.view.cycle_plots import cycle_branches
-from undrawn import nothing_drawn
+from undrawn import drawn_alone, nothing_drawn
 
 PARTS = ["sensitivities", "countermeasures"]
 
@@ -37,7 +37,8 @@ def test_cycles_of_the_same_model_are_shown(found: Cycles, tmp_path: Path):
     case = mode_coupling(0.02, 0.1)
     st.save(found, tmp_path / "cycles.nc")
     moved = case.with_({"temporal.step": 0.01, "phases": [{"name": "long", "duration": 99.0}], "modal.friction_range": [0, 1]})
-    text = page(moved, tmp_path)
+    with drawn_alone("cycle-branches", "cycle-period"):
+        text = page(moved, tmp_path)
     assert '<section id="limit-cycles"' in text
     assert found.sentence in text
     assert "it begins at the onset at μ = 0.7506; reversal of slip begins between" in text

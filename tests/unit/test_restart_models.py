@@ -127,8 +127,12 @@ def test_other_records_give_the_new_part_alone(case: st.Case, part: Trajectory) 
     ("change", "words"),
     [
         ({"contacts.A.friction.coefficient": 0.4}, "contacts.A.friction.coefficient: 0.1 → 0.4"),
-        ({"supports.clamp.velocity.x": 0.04}, "supports.clamp.velocity.x: 0.02 → 0.04"),
-        ({"loads.press.force": [0.0, -30.0]}, "loads.press.force: [0.0, -20.0] → [0.0, -30.0]"),
+        pytest.param(
+            {"supports.clamp.velocity.x": 0.04}, "supports.clamp.velocity.x: 0.02 → 0.04", marks=pytest.mark.slow
+        ),
+        pytest.param(
+            {"loads.press.force": [0.0, -30.0]}, "loads.press.force: [0.0, -20.0] → [0.0, -30.0]", marks=pytest.mark.slow
+        ),
         ({"phases.1.velocities": {"clamp": 0.5}}, "phases.1.velocities.clamp: 1.0 → 0.5"),
     ],
 )

@@ -32,7 +32,8 @@ critical = false
 
 @pytest.fixture(scope="module")
 def case() -> st.Case:
-    return st.loads(TEXT)
+    """As coarse as a block can be of which a mode grows."""
+    return st.loads(TEXT).with_({"bodies.block.mesh.divisions": [2, 2], "bodies.slider.mesh.divisions": [6, 1]})
 
 
 @pytest.fixture(scope="module")

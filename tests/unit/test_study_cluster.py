@@ -22,9 +22,10 @@ FEW = ["bodies.beam1.elements=3", "bodies.beam2.elements=6", "modal.max_frequenc
 MASS = "bodies.beam1.damping.mass"
 
 
-@pytest.fixture
-def scheduler(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """Address and workers."""
+@pytest.fixture(scope="module")
+def scheduler(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """Address and workers, one of which the last test kills."""
+    tmp_path = tmp_path_factory.mktemp("cluster")
     file = tmp_path / "scheduler.json"
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path, "start_new_session": True}
     dask = Path(sys.executable).with_name("dask")
@@ -49,6 +50,16 @@ def scheduler(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes
             process.wait()
 
 
+def test_workers_with_another_stridor_are_refused(scheduler, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from stridor.studies import cluster, task
+
+    monkeypatch.setattr(cluster, "program", lambda: "9.9.9 of-the-future")
+    case = st.loads(template_text("two-beams"), FEW)
+    study = st.Study(case=case, parameters={"mu": {"values": (0.1,)}}, answers={"source": "full"})
+    with pytest.raises(st.AnalysisError, match=rf"has another stridor \({task.program()}\) than this study \(9\.9\.9 of-the-future\)"):
+        st.run_study(study, tmp_path / "refused", scheduler=scheduler[0])
+
+
 def test_rows_are_those_of_local_workers_and_a_lost_worker_loses_none(scheduler, tmp_path: Path) -> None:
     address, workers = scheduler
     case = st.loads(template_text("two-beams"), FEW)
@@ -62,13 +73,3 @@ def test_rows_are_those_of_local_workers_and_a_lost_worker_loses_none(scheduler,
     assert found.done.all()
     for name in ("growth_rate", "frequency_hz", "unstable_modes"):
         assert np.array_equal(found.data[name].values, here.data[name].values, equal_nan=True)
-
-
-def test_workers_with_another_stridor_are_refused(scheduler, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from stridor.studies import cluster, task
-
-    monkeypatch.setattr(cluster, "program", lambda: "9.9.9 of-the-future")
-    case = st.loads(template_text("two-beams"), FEW)
-    study = st.Study(case=case, parameters={"mu": {"values": (0.1,)}}, answers={"source": "full"})
-    with pytest.raises(st.AnalysisError, match=rf"has another stridor \({task.program()}\) than this study \(9\.9\.9 of-the-future\)"):
-        st.run_study(study, tmp_path / "refused", scheduler=scheduler[0])

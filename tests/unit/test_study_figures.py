@@ -462,7 +462,8 @@ WHOLE = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("compute", list(WHOLE))
+# Figures of runs are those of comparisons, and more of steady sliding.
+@pytest.mark.parametrize("compute", [pytest.param(c, marks=pytest.mark.slow) if c == "simulate" else c for c in WHOLE])
 @pytest.mark.parametrize(
     "beside", [pytest.param(False, id="two vary"), pytest.param(True, id="three vary", marks=pytest.mark.slow)]
 )

@@ -14,6 +14,7 @@ from rubbing_block import rubbing_block
 from stridor.modal.onset import Onsets
 
 DOCS = ROOT / "docs"
+pytestmark = pytest.mark.slow  # as other long pages: weekly
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +50,6 @@ def test_what_the_text_says(followed: Page) -> None:
     assert re.sub(r"\d+ unknowns", "", sentence) in re.sub(r"\d+ unknowns", "", complete)
 
 
-@pytest.mark.slow
 def test_both_ways_give_the_same(followed: Page) -> None:
     folder = followed.folder
 

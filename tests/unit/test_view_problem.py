@@ -81,7 +81,7 @@ def test_what_is_no_mode_is_told() -> None:
 def test_every_figure_shows_itself_and_no_window_is_asked_for() -> None:
     program = (
         "import sys, stridor as st; from stridor.case import template_text\n"
-        "case = st.loads(template_text('two-beams'))\n"
+        "case = st.loads(template_text('two-beams'), ['bodies.beam1.elements=3', 'bodies.beam2.elements=6'])\n"
         "figure = st.plot.root_locus(st.modes(case, [0.0, 0.1, 0.2]))\n"
         "sys.stdout.buffer.write(figure._repr_png_()[:8])\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"
