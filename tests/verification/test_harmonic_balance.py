@@ -97,7 +97,7 @@ def begun_later(cycle: Cycle, by: int) -> Cycle:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("by", [0, 189, pytest.param(378, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("by", [0, *(pytest.param(by, marks=pytest.mark.slow) for by in (189, 378))])
 def test_without_reversal_what_is_left_is_the_grid_of_time(by: int, monkeypatch: pytest.MonkeyPatch):
     """Where contact with a stiffness parts and comes back, forces have kinks: means over n times are off by n⁻², by where
     the kinks fall between two of them. With enough times six harmonics have the period to 1e-6, 48 to 1e-8."""

@@ -328,7 +328,9 @@ COARSE = {
 
 
 @pytest.mark.parametrize("contact", ["rigid", "as given"])
-@pytest.mark.parametrize("complete", [True, False], ids=["all modes", "reduced"])
+@pytest.mark.parametrize(
+    "complete", [pytest.param(True, marks=pytest.mark.slow), False], ids=["all modes", "reduced"]
+)
 def test_a_pad_on_a_disc_grows_as_the_modes_say(contact: str, complete: bool, monkeypatch: pytest.MonkeyPatch):
     """45 nodes in space, friction that turns with the slip: growth within 1 % with 30 steps to the period."""
     monkeypatch.setattr(coordinates, "COMPLETE", 2000 if complete else 100)
@@ -364,7 +366,8 @@ def off_exact(seed: int) -> tuple[list[float], int]:
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(8), pytest.param(range(100, 400), marks=pytest.mark.slow)], ids=["few", "many"]
+    "seeds", [range(3), *(pytest.param(k, marks=pytest.mark.slow) for k in (range(3, 8), range(100, 400)))],
+    ids=["few", "some", "many"],
 )
 def test_random_systems_go_to_the_exact_run_with_smaller_steps(seeds: range):
     changes = refused = apart = 0

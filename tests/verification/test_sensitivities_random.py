@@ -78,7 +78,7 @@ def hold(seed: int) -> int:
 
 
 # Falling friction, with a rigid contact too, and one among Coulomb's.
-@pytest.mark.parametrize("seed", [3, pytest.param(9, marks=pytest.mark.slow), 13])
+@pytest.mark.parametrize("seed", [*(pytest.param(k, marks=pytest.mark.slow) for k in (3, 9)), 13])
 def test_derivatives_are_those_of_modes_solved_again(seed: int) -> None:
     assert hold(seed) > 10
 

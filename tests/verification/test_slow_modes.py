@@ -151,7 +151,7 @@ def apart(seed: int, slow: float, wide: float) -> Apart:
     return Apart((of(1.0, free, int(rng.integers(3, 6))), of(slow, 0, int(rng.integers(2, 4)))), free, slow, 6.0 * wide)
 
 
-@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(s, marks=pytest.mark.slow) for s in range(2, 6))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(s, marks=pytest.mark.slow) for s in range(1, 6))])
 @pytest.mark.parametrize(("slow", "wide"), [(1e-2, 1.0), (1e-3, 1e10), (1e-4, 1e4)])
 def test_slow_flutter_is_told_from_motions_as_a_whole(tmp_path: Path, seed: int, slow: float, wide: float) -> None:
     made = apart(seed, slow, wide)

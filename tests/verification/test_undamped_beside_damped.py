@@ -133,10 +133,10 @@ def _damped(mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray, push: 
     ]
 
 
-MANY = [pytest.param(range(k, k + 25), marks=pytest.mark.slow) for k in range(8, 208, 25)]
+MANY = [pytest.param(range(k, k + 25), marks=pytest.mark.slow) for k in (2, *range(8, 208, 25))]
 
 
-@pytest.mark.parametrize("seeds", [range(8), *MANY], ids=lambda seeds: f"from {seeds[0]}")
+@pytest.mark.parametrize("seeds", [range(2), *MANY], ids=lambda seeds: f"from {seeds[0]}")
 def test_random_pieces_against_their_own_onsets(seeds: range) -> None:
     undamped = 0
     for seed in seeds:
