@@ -295,7 +295,7 @@ def off_modes(case: st.Case, mu: float, limit_hz: float, parts: list[float]) -> 
     return np.abs(found)
 
 
-@pytest.mark.parametrize("contact", ["rigid", "as given"])
+@pytest.mark.parametrize("contact", ["rigid", pytest.param("as given", marks=pytest.mark.slow)])
 def test_a_small_motion_grows_as_the_modes_say(contact: str):
     """Two beams whose contact stays closed and slides: right to 1e-3 with 30 steps to the period, of fourth order."""
     case = st.loads(template_text("two-beams")).with_(
@@ -327,7 +327,7 @@ COARSE = {
 }
 
 
-@pytest.mark.parametrize("contact", ["rigid", "as given"])
+@pytest.mark.parametrize("contact", [pytest.param("rigid", marks=pytest.mark.slow), "as given"])
 @pytest.mark.parametrize(
     "complete", [pytest.param(True, marks=pytest.mark.slow), False], ids=["all modes", "reduced"]
 )
@@ -454,7 +454,7 @@ def pad(**changes: Any) -> st.Case:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("contact", ["rigid", "as given"])
+@pytest.mark.parametrize("contact", [pytest.param("rigid", marks=pytest.mark.slow), "as given"])
 def test_newtons_method_and_sweeps_find_the_same_impulses(contact: str, monkeypatch: pytest.MonkeyPatch):
     case = pad(**{"temporal.contact": contact})
     swept = st.simulate(case)

@@ -91,7 +91,7 @@ def assert_same(system: System, names: Sequence[str], *, band: float = BAND, end
 
 
 ALL = [(damped, stiffness) for damped in (True, False) for stiffness in (1e10, 1e8, "rigid")]
-FAST = [(True, "rigid"), (False, 1e8)]
+FAST = [(False, 1e8)]
 
 
 @pytest.mark.parametrize(
@@ -102,7 +102,7 @@ def test_two_beams_by_every_source(damped, stiffness):
     assert assert_same(build_system(two_beams(damped, stiffness, **coarse)), NAMES) >= 3
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(s, marks=pytest.mark.slow) for s in range(1, 20))])
+@pytest.mark.parametrize("seed", [3, *(pytest.param(s, marks=pytest.mark.slow) for s in range(20) if s != 3)])
 def test_random_benches_by_every_source(seed):
     """One to three beams on a master, on nodes and between them, rigid and elastic contacts mixed."""
     random = np.random.default_rng(seed)

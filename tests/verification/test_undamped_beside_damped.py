@@ -56,7 +56,7 @@ def minimal_model(damping: float, cubic: float) -> st.Case:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(("damping", "cubic"), [(0.1, 0.0), (1e-4, 0.0), (0.1, 1.0)])
+@pytest.mark.parametrize(("damping", "cubic"), [(0.1, 0.0), (1e-4, 0.0), pytest.param(0.1, 1.0, marks=pytest.mark.slow)])
 def test_two_modes_that_nothing_damps_meet_as_if_nothing_were_damped(damping: float, cubic: float) -> None:
     found = st.onsets(minimal_model(damping, cubic))
     (onset,) = found.onsets
