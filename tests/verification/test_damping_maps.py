@@ -35,7 +35,7 @@ def block() -> st.Case:
 
 @pytest.fixture(scope="module")
 def maps(block) -> dict[str, damping_map.DampingMap]:
-    return {method: solve(block, X, Y, grid=(2, 2), method=method, **RANGES) for method in ("full", "reduced")}
+    return {method: solve(block, X, Y, grid=(2, 3), method=method, **RANGES) for method in ("full", "reduced")}
 
 
 @pytest.fixture(scope="module")
