@@ -218,6 +218,7 @@ def test_small_frames_swing_in_cycles_that_go_somewhere(seeds: Sequence[int]):
     assert sum(check_closes(seed, 0.6, nodes=2, contacts=1 + seed % 2, rigid=True) for seed in seeds) >= 2
 
 
+@pytest.mark.slow  # in each run: the test before, of smaller ones
 @pytest.mark.parametrize("seeds", [(201, 206, 210), pytest.param(range(200, 260), marks=pytest.mark.slow)])
 def test_frames_swing_in_cycles_that_go_somewhere(seeds: Sequence[int]):
     assert sum(check_closes(seed, 1.0, damping=0.02) for seed in seeds) >= 2
