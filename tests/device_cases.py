@@ -25,8 +25,8 @@ NAMES = ("legs", "beta2", "contacts")
 ALONE = "alone"  # the last track of the first
 SHARED = {"legs": 48 * 1024, "beta2": 1200, "contacts": 0}  # bytes for the member and its modes, for its rows, for none
 SIZES = {"bodies.beam1.elements": 2, "bodies.beam2.elements": 3, "temporal.step": None, "temporal.record_every": 3}
-PRESS = PhaseSpec("press", 2e-4, {}, {"clamp": 0.0}, 1e-4)
-SLIDE = PhaseSpec("slide", 2e-4, {}, {"clamp": 1.0}, 5e-5)
+PRESS = PhaseSpec("press", 1e-4, {}, {"clamp": 0.0}, 5e-5)
+SLIDE = PhaseSpec("slide", 1e-4, {}, {"clamp": 1.0}, 5e-5)
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,10 @@ ALIKE = 0.002  # mean difference of two pictures, of the range from black to whi
 # Runs through stick, slip and separation are chaotic: the last digit of a processor's additions turns a shape round.
 # What such scripts find they assert in numbers that bear it.
 CHAOTIC = {"paper_shapes": 0.08, "paper_in_time": 0.08, "sliding_map": 0.3}
-SLOW = {"uneven_damping", "countermeasures", "reduction", "growth_both_ways", "what_onsets_hang_on"}
+SLOW = {
+    "uneven_damping", "countermeasures", "reduction", "growth_both_ways", "what_onsets_hang_on", "paper_damping",
+    "paper_all_modes", "ziegler_column", "falling_friction", "hysteresis", "parameter_study",
+}  # fmt: skip
 MARKED = [pytest.param(e, id=e.stem, marks=[pytest.mark.slow] if e.stem in SLOW else []) for e in EXAMPLES]
 
 

@@ -102,10 +102,13 @@ def growth(result):
     return late / early
 
 
+# In each run: `verification/test_agreement.py::test_critical_friction_by_bisection_encloses_the_modal_onset`.
+@pytest.mark.slow
 def test_friction_below_the_onset_decays():
     assert growth(march(contacts__A__friction__coefficient=0.07, sliding=0.03)) < 0.7
 
 
+@pytest.mark.slow
 def test_friction_just_above_the_onset_grows():
     assert growth(march(contacts__A__friction__coefficient=0.085, sliding=0.03)) > 2.0
 

@@ -54,7 +54,7 @@ def test_every_mode_seen_in_time_is_a_complex_mode(case: st.Case, mu: float) -> 
 
 
 @pytest.mark.parametrize("stepper", ["exact", "implicit"])
-@pytest.mark.parametrize("damping", [0.0, 0.1, 0.5])
+@pytest.mark.parametrize("damping", [pytest.param(0.0, marks=pytest.mark.slow), 0.1, pytest.param(0.5, marks=pytest.mark.slow)])
 def test_decay_in_time_is_that_of_a_mode(damping: float, stepper: str) -> None:
     """Motion dies away to rounding, or to what implicit contact is solved to, long before the march ends: what is left
     is no vibration. Dashpots c at 45° both ways damp the minimal model by c in all directions: Re λ = −c/2."""

@@ -149,8 +149,11 @@ def left_by_the_end(seed: int) -> int:
     return int(named is not None)
 
 
-def test_modes_that_leave_the_band_growing_are_said_to():
-    assert sum(left_by_the_end(seed) for seed in range(30)) >= 3
+@pytest.mark.parametrize(
+    ("seeds", "least"), [(range(11, 17), 2), pytest.param(range(30), 3, marks=pytest.mark.slow)], ids=["few", "many"]
+)
+def test_modes_that_leave_the_band_growing_are_said_to(seeds: range, least: int):
+    assert sum(left_by_the_end(seed) for seed in seeds) >= least
 
 
 @pytest.mark.slow

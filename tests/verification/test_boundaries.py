@@ -170,7 +170,7 @@ def test_an_island(tmp_path: Path, centre: tuple[float, float], axes: tuple[floa
     against_a_grid(*curves)
 
 
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
+@pytest.mark.parametrize("tolerance", [pytest.param(1e-3, marks=pytest.mark.slow), 1e-5])
 def test_pieces_between_points_are_as_near_as_asked_for(tmp_path: Path, tolerance: float) -> None:
     case = damped_by(tmp_path, "0.1*(((x - 0.46)/0.2)**2 + ((mu - 0.55)/0.15)**2 - 1)")
     found = st.stability_boundary(case, "x", "mu", x_range=(0.0, 1.0), y_range=(0.0, 1.0), tolerance=tolerance, lines=3)
@@ -189,7 +189,7 @@ def test_an_island_that_cuts_no_line_and_is_nowhere_counted_is_not_excluded(tmp_
     assert not found.curves
     assert "at most 25 % of a range apart" in found.sentence
     assert "Not excluded" in found.sentence
-    finer = st.stability_boundary(case, "x", "mu", x_range=(0.0, 1.0), y_range=(0.0, 1.0), lines=6)
+    finer = st.stability_boundary(case, "x", "mu", x_range=(0.0, 0.4), y_range=(0.0, 0.4), lines=3)
     assert len(finer.curves) == 1  # at 0.2 there is a line now
 
 
@@ -203,7 +203,7 @@ def missed_islands(seed: int, folder: Path) -> tuple[int, int]:
     return sum(off > 0.01 for off in near), len(islands)
 
 
-@pytest.mark.parametrize("seed", [13, 142])
+@pytest.mark.parametrize("seed", [pytest.param(13, marks=pytest.mark.slow), 142])
 def test_small_islands_are_found_up_the_growth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
     """They cut no line and are betrayed by no count, but by how the damping falls off around them."""
     assert missed_islands(seed, tmp_path)[0] == 0
@@ -223,7 +223,7 @@ def test_shading_is_true_where_growing_modes_pass_the_highest_frequency(tmp_path
     curve is: what is not known there is a narrow strip, and all else is true."""
     top = np.sqrt(2.265) / (2 * np.pi)  # ω on the curve at x = 0.53
     found = st.stability_boundary(
-        flutter(tmp_path), "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, 3.0), max_frequency_hz=top
+        flutter(tmp_path), "x", "mu", x_range=(-1.0, 2.0), y_range=(0.0, 3.0), max_frequency_hz=top, lines=3
     )
     assert found.agree
     assert any("growing modes pass the highest frequency" in note for note in found.notes)
@@ -291,18 +291,25 @@ def test_branches_that_cross(tmp_path: Path) -> None:
     against_a_grid(*curves)
 
 
-def test_two_beams_against_onsets_of_the_full_problem() -> None:
+@pytest.mark.parametrize(
+    ("top", "lines", "values"),
+    [(15e3, 2, (1234.0,)), pytest.param(40e3, LINES, (0.0, 1234.0, 2000.0), marks=pytest.mark.slow)],
+    ids=["low band", "whole band"],
+)
+def test_two_beams_against_onsets_of_the_full_problem(top: float, lines: int, values: tuple[float, ...]) -> None:
     """Curves over a damping, some of which cross, at values of it at which all onsets are sought anew along μ."""
     case, path, high = paper_case(), "bodies.beam2.damping.mass", 2000.0
-    found = st.stability_boundary(case, path, "mu", x_range=(0.0, high), y_range=(0.0, 0.5))
+    asked = {"x_range": (0.0, high), "y_range": (0.0, 0.5), "max_frequency_hz": top, "lines": lines}
+    found = st.stability_boundary(case, path, "mu", **asked)
+    assert len(found.curves) > 1
     assert found.agree
     assert found.method == "reduced"
     assert found.solves + found.steps <= 0.02 * FINE**2
     assert max(c.difference for c in found.confirmed) <= 1e-6
     error = np.concatenate([c.error for c in found.curves])
     assert np.nanmax(error) <= 1e-4
-    for value in (0.0, 1234.0, 2000.0):
-        onsets = [o for o in st.onsets(case.with_({path: value}), (0.0, 0.5)).onsets if o.frequency_hz <= 40e3]
+    for value in values:
+        onsets = [o for o in st.onsets(case.with_({path: value}), (0.0, 0.5)).onsets if o.frequency_hz <= top]
         at = sorted(
             (float(np.interp(value, x, y)), float(np.interp(value, x, f))) for x, y, f in map(ascending, found.polylines())
             if x.min() <= value <= x.max()
@@ -341,7 +348,7 @@ def ascending(line: tuple[np.ndarray, np.ndarray, np.ndarray]) -> tuple[np.ndarr
 
 def test_neither_number_may_be_friction() -> None:
     """At a point of a curve over two other numbers the case's own friction is an onset."""
-    case = paper_case()
+    case = paper_case(bodies__beam1__elements=6, bodies__beam2__elements=18)
     paths = "materials.steel.density", "bodies.beam1.damping.mass"
     found = st.stability_boundary(case, *paths, x_range=(7000.0, 8000.0), y_range=(0.0, 2000.0), max_frequency_hz=20e3, lines=2)
     assert found.curves
@@ -380,8 +387,8 @@ def wrong(seed: int, every: int = 1) -> tuple[bool, str]:
     return True, f"seed {seed}: no boundary at {off[0].round(4)}" if off else ""
 
 
-FEW = range(3)
-MORE = [pytest.param(seeds, marks=pytest.mark.slow) for seeds in ((3, 4), (7, 10), (13, 100), (140, 278))]
+FEW = range(1)
+MORE = [pytest.param(seeds, marks=pytest.mark.slow) for seeds in ((1, 2), (3, 4), (7, 10), (13, 100), (140, 278))]
 
 
 @pytest.mark.parametrize("seeds", [FEW, *MORE], ids=str)
@@ -471,7 +478,7 @@ def test_what_is_refused(words: dict, said: str) -> None:
 
 def test_the_verb(tmp_path: Path) -> None:
     flutter(tmp_path)
-    words = ("boundary", "case.toml", "--x", "x", "--x-range", "-1:2", "--y", "mu", "--y-range", "0:3", "--lines", "3")
+    words = ("boundary", "case.toml", "--x", "x", "--x-range", "-1:2", "--y", "mu", "--y-range", "0:3", "--lines", "2")
     done = stridor(*words, "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
@@ -485,7 +492,7 @@ def test_the_verb(tmp_path: Path) -> None:
     assert "one curve bounds where nothing grows, down to x = " in " ".join(said.split())
     following = shlex.split(said.partition("Next: stridor ")[2].replace("\\\n", " "))
     assert stridor(*following, cwd=tmp_path).returncode == 0
-    called = st.stability_boundary(st.load(tmp_path / "case.toml"), "x", "mu", x_range=(-1, 2), y_range=(0, 3), lines=3)
+    called = st.stability_boundary(st.load(tmp_path / "case.toml"), "x", "mu", x_range=(-1, 2), y_range=(0, 3), lines=2)
     assert called.to_json() == {k: v for k, v in document.items() if k != "files"}
     data = called.to_xarray()
     assert data["x"].values.tolist() == curve["x"]

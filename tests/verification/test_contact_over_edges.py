@@ -61,9 +61,10 @@ def placed(mesh, size, turn, offset):
 
 
 @pytest.mark.parametrize(("own", "other"), [*itertools.product(SPACE, SPACE)])
-def test_areas_are_those_of_the_common_part_of_random_rectangles(own, other):
+@pytest.mark.parametrize("seeds", [2, pytest.param(4, marks=pytest.mark.slow)])
+def test_areas_are_those_of_the_common_part_of_random_rectangles(own, other, seeds):
     rng = np.random.default_rng([SPACE.index(own), SPACE.index(other)])
-    for seed in range(4):
+    for seed in range(seeds):
         slave = exact_sheet(own, *rng.integers(3, 6, 2), seed=seed, turned=True)
         master = exact_sheet(other, *rng.integers(1, 6, 2), seed=seed + 50)
         slave, own_corners = placed(slave, rng.uniform(0.7, 1.4, 2), rng.uniform(0, 6), rng.uniform(-0.4, 0.4, 2))
@@ -263,14 +264,15 @@ def test_a_pad_stands_for_the_area_that_the_disc_covers(disc_is_slave, cells, at
         assert np.abs(force).max() > 0
 
 
-def test_whichever_body_is_the_slave_modes_come_together_with_finer_meshes():
+@pytest.mark.parametrize("finest", [2, pytest.param(3, marks=pytest.mark.slow)])
+def test_whichever_body_is_the_slave_modes_come_together_with_finer_meshes(finest: int):
     """At µ = 0.4 three modes of the pad on its layer, largest difference: 12.3, 4.5 and 1.8 %; it was 14, 26 and 21 %."""
     apart = []
-    for fineness in (1, 2, 3):
+    for fineness in range(1, finest + 1):
         pad, disc = (
             st.modes(pad_and_disc(disc_is_slave=turned, fineness=fineness), 0.4).frequency_hz[0][:3] for turned in (False, True)
         )
         apart.append(float(np.abs(disc / pad - 1).max()))
     assert apart[0] < 0.13
     assert apart[1] < 0.05
-    assert apart[2] < 0.025
+    assert len(apart) < 3 or apart[2] < 0.025

@@ -96,7 +96,7 @@ def apart(one: np.ndarray, other: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize(
-    "seeds", [(4, 7), pytest.param(range(30), marks=pytest.mark.slow)], ids=["few", "many"]
+    "seeds", [(7,), pytest.param(range(30), marks=pytest.mark.slow)], ids=["few", "many"]
 )
 def test_random_cycles_that_only_slip_have_the_multipliers_of_their_motions(seeds: Sequence[int]):
     """None is missing, however far the other modes are above the frequency of the cycle."""

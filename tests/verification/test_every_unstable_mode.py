@@ -26,7 +26,7 @@ from stridor.system import System
 
 pytestmark = pytest.mark.verification
 
-FEW = (1, 2, 4, 5)  # in the first of them branches from below the band do not lead to all that grows
+FEW = (1, 5)  # in the first of them branches from below the band do not lead to all that grows
 MANY = [pytest.param(k, marks=pytest.mark.slow) for k in range(120) if k not in FEW]
 FAINT = 1e-6  # of |λ|: growth that either side may take for rounding
 BORDER = 1e-6  # of the band
@@ -230,7 +230,7 @@ def dense_of_meshed(case: st.Case, mu: float, touching_at: float | None = None) 
 
 
 # -- meshed bodies -----------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("seed", [0, 1, *[pytest.param(k, marks=pytest.mark.slow) for k in range(2, 12)]])
+@pytest.mark.parametrize("seed", [1, *[pytest.param(k, marks=pytest.mark.slow) for k in (0, *range(2, 12))]])
 def test_of_meshed_bodies(seed: int):
     """A rubbing block, with springs that hold it or drive it, against the dense eigenvalues of its matrices."""
     rng = np.random.default_rng([seed, 3])

@@ -562,7 +562,7 @@ def test_a_run_that_is_cut_goes_on_to_the_last_digit(monkeypatch: pytest.MonkeyP
     assert np.abs(changed.displacement[len(part.time)] - whole.displacement[len(part.time)]).max() < 1e-9
 
 
-@pytest.mark.parametrize("cut", [74, 185, 333])
+@pytest.mark.parametrize("cut", [74, *(pytest.param(k, marks=pytest.mark.slow) for k in (185, 333))])
 def test_random_runs_that_are_cut_go_on_to_the_last_digit(cut: int, monkeypatch: pytest.MonkeyPatch):
     """A restart looks ahead anew, from where the leg that was cut began to be looked through."""
 

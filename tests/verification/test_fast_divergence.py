@@ -29,7 +29,7 @@ def bench(stiffness: float, *, across: bool = False) -> st.Case:
     text = template_text("two-beams") + SPRING.format(stiffness)
     if across:
         text = text.replace("beam1.tip\", \"ground", "beam2.end\", \"ground")
-    return st.loads(text).with_({"bodies.beam1.elements": 8, "bodies.beam2.elements": 18})
+    return st.loads(text).with_({"bodies.beam1.elements": 6, "bodies.beam2.elements": 14})
 
 
 def dense_divergence(system: st.System) -> np.ndarray:

@@ -110,7 +110,7 @@ def oscillator(friction: str, damping: float, stiffness: str = "1e6"):
     return loads(OSCILLATOR.format(friction=friction, damping=damping, stiffness=stiffness))
 
 
-@pytest.mark.parametrize("stiffness", ["1e6", '"rigid"'])
+@pytest.mark.parametrize("stiffness", ["1e6", pytest.param('"rigid"', marks=pytest.mark.slow)])
 def test_damping_below_the_fall_of_friction_grows(stiffness):
     """c_crit = −N dμ/dv in closed form; the growth is (c_crit − c)/2m to the digit, on both sides of it."""
     critical = -10.0 * CURVE.slope(0.3)

@@ -42,7 +42,7 @@ def assert_same(ours: st.ComplexModes, theirs: st.ComplexModes, rel: float) -> N
     assert all(s.endswith(FOLLOWED) for s in theirs.completeness)
 
 
-@pytest.mark.parametrize("damped", [True, False])
+@pytest.mark.parametrize("damped", [pytest.param(True, marks=pytest.mark.slow), False])
 def test_branches_of_the_bench_pass_through_flutter(tmp_path: Path, damped: bool):
     """Modes 8 and 10 meet beside 9, which they cross; the growing one keeps its number."""
     bench = paper_case()

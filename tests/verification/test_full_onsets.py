@@ -181,7 +181,7 @@ def test_divergence_with_and_without_damping(tmp_path: Path):
     assert onset.growth_slope == pytest.approx(2 / (0.1 * 2.5), rel=1e-9)
 
 
-@pytest.mark.parametrize("middle", [0.23, 0.47, *(pytest.param(m, marks=pytest.mark.slow) for m in (0.41, 0.62, 0.79))])
+@pytest.mark.parametrize("middle", [0.23, *(pytest.param(m, marks=pytest.mark.slow) for m in (0.41, 0.47, 0.62, 0.79))])
 def test_growth_that_begins_and_ends_within_a_step(tmp_path: Path, middle: float):
     # Growth that begins and ends again within less than a twentieth of the range, far from everything else.
     terms = [
@@ -307,13 +307,14 @@ def assert_same_onsets(structured: st.Onsets, imported: st.Onsets) -> None:
     assert structured.completeness == "" or structured.completeness.startswith("Checked at both ends: ")
 
 
+@pytest.mark.slow  # in each run: `test_the_bench_as_solids` and, undamped, `test_undamped_meetings_beside_damping_elsewhere`
 @pytest.mark.parametrize("damped", [True, False])
 def test_the_published_bench(tmp_path: Path, damped: bool):
     bench = paper_case(bodies__beam1__elements=10, bodies__beam2__elements=30)
     assert_same_onsets(st.onsets(bench, damped=damped), st.onsets(export(tmp_path, bench), damped=damped))
 
 
-@pytest.mark.parametrize("damped", [True, False])
+@pytest.mark.parametrize("damped", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_the_bench_as_solids(tmp_path: Path, damped: bool, monkeypatch: pytest.MonkeyPatch):
     """A stiff guide leaves 1e-10 of λ to rounding; with g summed more precisely Newton is there in a few steps of the
     full problem all the same."""
@@ -361,8 +362,8 @@ def test_friction_the_other_way_is_another_problem(tmp_path: Path):
 @pytest.mark.parametrize(
     ("stiffness", "damped"),
     [
-        *((1e12, False), ("rigid", True)),
-        *(pytest.param(*p, marks=pytest.mark.slow) for p in ((1e12, True), ("rigid", False))),
+        (1e12, False),
+        *(pytest.param(*p, marks=pytest.mark.slow) for p in ((1e12, True), ("rigid", True), ("rigid", False))),
     ],
 )
 def test_contact_that_stridor_makes_of_imported_surfaces(tmp_path: Path, stiffness: float | str, damped: bool):
@@ -376,7 +377,7 @@ def test_contact_that_stridor_makes_of_imported_surfaces(tmp_path: Path, stiffne
 
 def test_undamped_meetings_beside_damping_elsewhere(tmp_path: Path):
     """The undamped bench and a damped oscillator that does not touch it are one damped problem."""
-    bench = paper_case(bodies__beam1__elements=10, bodies__beam2__elements=30)
+    bench = paper_case(bodies__beam1__elements=6, bodies__beam2__elements=18)
     n = build_system(bench).size
     mass, _, stiffness, friction = (t[0] for t in exported(bench))
     terms = [

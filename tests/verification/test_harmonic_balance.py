@@ -97,7 +97,7 @@ def begun_later(cycle: Cycle, by: int) -> Cycle:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("by", [0, 189, pytest.param(378, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("by", [0, *(pytest.param(by, marks=pytest.mark.slow) for by in (189, 378))])
 def test_without_reversal_what_is_left_is_the_grid_of_time(by: int, monkeypatch: pytest.MonkeyPatch):
     """Where contact with a stiffness parts and comes back, forces have kinks: means over n times are off by n⁻², by where
     the kinks fall between two of them. With enough times six harmonics have the period to 1e-6, 48 to 1e-8."""
@@ -428,7 +428,9 @@ def cycles_of(system: System) -> list[ClosedShot]:
 
 
 @pytest.mark.parametrize(
-    "seeds", [(55, 76), pytest.param(range(40, 140), marks=pytest.mark.slow)], ids=["few", "many"]
+    "seeds",
+    [(76,), *(pytest.param(k, marks=pytest.mark.slow) for k in ((55,), range(40, 140)))],
+    ids=["few", "other", "many"],
 )
 def test_random_systems_have_the_cycles_of_shooting(seeds: range):
     """One to two contacts with stiffness, three to five masses. Where slip neither turns nor sticks the period is right
@@ -466,13 +468,14 @@ def test_slip_that_turns_is_told_as_by_shooting(mu: float, turning: float):
         assert sampled_series(beside(cycle, family, harmonics), "").kinds == cycle.kinds
 
 
-@pytest.mark.parametrize("damping", [0.06, pytest.param(0.1, marks=pytest.mark.slow)])
-def test_series_that_overshoot_beside_stick_do_not_turn(damping: float):
+@pytest.mark.parametrize("damping", [None, *(pytest.param(d, marks=pytest.mark.slow) for d in (0.06, 0.1))])
+def test_series_that_overshoot_beside_stick_do_not_turn(damping: float | None, falling_branch: Cycles):
     """A mass on a belt whose friction falls never overtakes it, so slip comes to rest and goes on the same way (by
     integration of the equation of motion, too); what series of its slip have on the other side is their overshoot."""
-    law = Hyperbolic(0.0, 1.0, 3.0)
-    system = block_on_belt(law=law, damping=damping, speed=0.5)
-    found = st.cycles(system, between=(0.02, 0.3), method="harmonic", runs=0)
+    found = falling_branch
+    if damping is not None:
+        system = block_on_belt(law=Hyperbolic(0.0, 1.0, 3.0), damping=damping, speed=0.5)
+        found = st.cycles(system, between=(0.02, 0.3), method="harmonic", runs=0)
     assert any("stick" in c.kinds for c in found.cycles)
     overshoot = [np.abs(c.slip_range).min() / c.slip_amplitude for c in found.cycles if c.slip_range.prod() < 0.0]
     assert 0.0 < max(overshoot) < 0.03
@@ -536,6 +539,7 @@ def test_a_pad_on_a_disc():
         st.cycles(work, 0.2, method="shooting")
 
 
+@pytest.mark.slow  # in each run: `test_a_pad_on_a_disc`, and `test_cycles.py` has the explicit runs
 def test_a_block_on_a_slider_swings_as_in_an_explicit_run():
     """11 nodes in the plane, far from the onset; contacts part and come back."""
     damping = {"mass": 20.0, "stiffness": 2e-7}

@@ -295,7 +295,7 @@ def off_modes(case: st.Case, mu: float, limit_hz: float, parts: list[float]) -> 
     return np.abs(found)
 
 
-@pytest.mark.parametrize("contact", ["rigid", "as given"])
+@pytest.mark.parametrize("contact", ["rigid", pytest.param("as given", marks=pytest.mark.slow)])
 def test_a_small_motion_grows_as_the_modes_say(contact: str):
     """Two beams whose contact stays closed and slides: right to 1e-3 with 30 steps to the period, of fourth order."""
     case = st.loads(template_text("two-beams")).with_(
@@ -327,8 +327,10 @@ COARSE = {
 }
 
 
-@pytest.mark.parametrize("contact", ["rigid", "as given"])
-@pytest.mark.parametrize("complete", [True, False], ids=["all modes", "reduced"])
+@pytest.mark.parametrize("contact", [pytest.param("rigid", marks=pytest.mark.slow), "as given"])
+@pytest.mark.parametrize(
+    "complete", [pytest.param(True, marks=pytest.mark.slow), False], ids=["all modes", "reduced"]
+)
 def test_a_pad_on_a_disc_grows_as_the_modes_say(contact: str, complete: bool, monkeypatch: pytest.MonkeyPatch):
     """45 nodes in space, friction that turns with the slip: growth within 1 % with 30 steps to the period."""
     monkeypatch.setattr(coordinates, "COMPLETE", 2000 if complete else 100)
@@ -364,7 +366,8 @@ def off_exact(seed: int) -> tuple[list[float], int]:
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(8), pytest.param(range(100, 400), marks=pytest.mark.slow)], ids=["few", "many"]
+    "seeds", [range(3), *(pytest.param(k, marks=pytest.mark.slow) for k in (range(3, 8), range(100, 400)))],
+    ids=["few", "some", "many"],
 )
 def test_random_systems_go_to_the_exact_run_with_smaller_steps(seeds: range):
     changes = refused = apart = 0
@@ -451,7 +454,7 @@ def pad(**changes: Any) -> st.Case:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("contact", ["rigid", "as given"])
+@pytest.mark.parametrize("contact", [pytest.param("rigid", marks=pytest.mark.slow), "as given"])
 def test_newtons_method_and_sweeps_find_the_same_impulses(contact: str, monkeypatch: pytest.MonkeyPatch):
     case = pad(**{"temporal.contact": contact})
     swept = st.simulate(case)

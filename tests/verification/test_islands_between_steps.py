@@ -14,8 +14,8 @@ from stridor.modal.full import search
 
 pytestmark = pytest.mark.verification
 
-RUN = range(0, 14)
-MORE = [pytest.param(range(k, k + 40), marks=pytest.mark.slow) for k in range(14, 414, 40)]
+RUN = range(0, 4)
+MORE = [pytest.param(range(k, k + 40), marks=pytest.mark.slow) for k in (4, *range(14, 414, 40))]
 HZ = 3000.0  # above everything there is
 NOTHING = 1e-9  # of |λ|
 

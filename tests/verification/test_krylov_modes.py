@@ -111,7 +111,13 @@ def eliminated(system: System, mu: float, damping=0.0, stiffness=0.0) -> np.ndar
 # -- eigenvalues -------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("damping", [0.0, 1.0])
-@pytest.mark.parametrize("compliance", [0.0, 0.1, 1e-3, np.array([0.0, 0.02, 0.0, 0.1, 0.0, 0.0, 0.05])])
+@pytest.mark.parametrize(
+    "compliance",
+    [
+        *(pytest.param(c, marks=pytest.mark.slow) for c in (0.0, 0.1)),
+        *(1e-3, np.array([0.0, 0.02, 0.0, 0.1, 0.0, 0.0, 0.05])),
+    ],
+)
 def test_random_contacts_have_the_eigenvalues_of_the_eliminated_problem(dimension, damping, compliance):
     system = scattered(dimension, compliance, damping)
     modes = krylov_modes(system, [0.0, 0.3, 1.0], count=15, damped=damping > 0)

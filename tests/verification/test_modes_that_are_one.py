@@ -44,7 +44,7 @@ def mass_on_belt(stiffness: float, contact: float, damping: float, *, masses: in
 
 @pytest.mark.parametrize("source", ["krylov", "full", "reduced"])
 @pytest.mark.parametrize("damping", [0.0, 0.02])
-@pytest.mark.parametrize("masses", [1, 2, 3])
+@pytest.mark.parametrize("masses", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 3))])
 def test_a_contact_as_stiff_as_its_spring_has_no_onset(source: str, damping: float, masses: int) -> None:
     case = mass_on_belt(1.0, 1.0, damping, masses=masses, source=source)
     mu = [0.0, 0.1, 0.3, 0.9]

@@ -186,8 +186,10 @@ def random_bench(seed: int) -> System:
 BUBBLE = Slave(place=0.5032441, lean_deg=10.178183, length=0.07440715, elements=4, stiffness=2.69258829e9)
 
 
-@pytest.mark.parametrize("system", [*map(random_bench, range(5)), bench(BUBBLE, elements=7).undamped()],
-                         ids=[*map(str, range(5)), "bubble"])  # fmt: skip
+@pytest.mark.parametrize("system", [
+    random_bench(0), *(pytest.param(random_bench(k), marks=pytest.mark.slow) for k in range(1, 5)),
+    bench(BUBBLE, elements=7).undamped(),
+], ids=[*map(str, range(5)), "bubble"])  # fmt: skip
 def test_onsets_are_the_extrema_of_the_receptance_curve(system):
     limit, top = 2 * np.pi * 30e3, 1.5
     reference = [(m, w) for m, w in Curve(system).extrema(limit, top) if m < 0.999 * top]

@@ -27,8 +27,8 @@ def along(folder: Path, *words: str) -> dict:
 
 @pytest.mark.parametrize(
     ("name", "between", "damped"),
-    [("contacts.A.stiffness", "1e7:1e10", True), ("bodies.beam1.damping.mass", "0:2000", True),
-     ("contacts.A.stiffness", "1e7:1e10", False)],
+    [pytest.param("contacts.A.stiffness", "1e7:1e10", True, marks=pytest.mark.slow),
+     ("bodies.beam1.damping.mass", "0:2000", True), ("contacts.A.stiffness", "1e7:1e10", False)],
 )  # fmt: skip
 def test_the_friction_is_critical_there(tmp_path: Path, name: str, between: str, damped: bool) -> None:
     """With the number as it is at an onset along it, the case's own friction is an onset along μ."""

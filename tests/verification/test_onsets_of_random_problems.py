@@ -20,8 +20,9 @@ from stridor.system import System
 
 pytestmark = pytest.mark.verification
 
-EACH = 61  # problems in each run
-FIRST, MANY = 61, 2000  # and weekly, of all sizes
+EACH = 16  # problems in each run, two of each kind
+SMALLER = 61  # and weekly as small ones, and
+FIRST, MANY = 61, 2000  # those of all sizes
 UNANSWERED = 0.03  # share at most of which it may be said that the answer is not whole
 
 
@@ -36,8 +37,11 @@ def judged(seeds: Iterable[int], folder: Path, *, small: bool = False) -> tuple[
 
 
 @pytest.mark.parametrize("kind", range(len(KINDS)), ids=KINDS)
-def test_some(kind: int, tmp_path: Path) -> None:
-    wrong, said = judged(range(kind, EACH, len(KINDS)), tmp_path, small=True)
+@pytest.mark.parametrize(
+    ("first", "end"), [(0, EACH), pytest.param(EACH, SMALLER, marks=pytest.mark.slow)], ids=["few", "more"]
+)
+def test_some(first: int, end: int, kind: int, tmp_path: Path) -> None:
+    wrong, said = judged(range(first + kind, end, len(KINDS)), tmp_path, small=True)
     assert not wrong, "\n".join(wrong)
     assert not said, "\n".join(said)
 
@@ -77,7 +81,9 @@ def test_all_that_opens_at_the_very_start(tmp_path: Path) -> None:
     assert not disagreement(replace(problem, solve=lambda _: found), tmp_path)[0]
 
 
-@pytest.mark.parametrize("followed", [True, False], ids=["followed", "counted"])
+@pytest.mark.parametrize(
+    "followed", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["followed", "counted"]
+)
 def test_growth_that_opens_at_the_start_as_a_square(
     followed: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -95,9 +101,11 @@ def test_growth_that_opens_at_the_start_as_a_square(
     np.testing.assert_allclose([o.frequency_hz for o in found.onsets], grown, rtol=1e-4)
 
 
-# With 24 of 46 modes of the second the search takes some seconds.
+# With 24 of 46 modes of the last the search takes some seconds.
 @pytest.mark.parametrize(
-    ("seed", "count"), [(550, 10), (1406, 4), pytest.param(702, 24, marks=pytest.mark.slow)], ids=["550", "1406", "702"]
+    ("seed", "count"),
+    [(1406, 4), *(pytest.param(*of, marks=pytest.mark.slow) for of in ((550, 10), (702, 24)))],
+    ids=["1406", "550", "702"],
 )
 def test_more_of_them(seed: int, count: int, tmp_path: Path) -> None:
     problem = random_problem(seed)
@@ -153,11 +161,13 @@ def test_many(first: int, tmp_path: Path) -> None:
 
 
 # Where nothing damps, friction that falls makes everything grow from no friction on: some of that is not answered whole.
-FALLING = [0, 1, 2, 3, 4, 7, 8]
+FALLING, WHOLE = [0, 1], [2, 3, 4, 7, 8]
 MORE_FALLING = [pytest.param(range(k, k + 20), marks=pytest.mark.slow) for k in range(9, 209, 20)]
 
 
-@pytest.mark.parametrize("seeds", [FALLING, *MORE_FALLING], ids=lambda seeds: f"from {seeds[0]}")
+@pytest.mark.parametrize(
+    "seeds", [FALLING, pytest.param(WHOLE, marks=pytest.mark.slow), *MORE_FALLING], ids=lambda seeds: f"from {seeds[0]}"
+)
 def test_of_friction_that_falls_with_speed(seeds: Iterable[int], tmp_path: Path) -> None:
     """Against slopes, forces and eigenvalues by hand."""
     wrong, said = list[str](), list[str]()
@@ -166,7 +176,7 @@ def test_of_friction_that_falls_with_speed(seeds: Iterable[int], tmp_path: Path)
         wrong += [words] if words else []
         said += [refused] if refused else []
     assert not wrong, "\n".join(wrong)
-    assert len(said) <= (0 if seeds is FALLING else 3), "\n".join(said)
+    assert len(said) <= (3 if isinstance(seeds, range) else 0), "\n".join(said)
 
 
 def along_the_axis(system: System, between: tuple[float, float], hz: float, *, damped: bool = True) -> Onsets:
@@ -175,11 +185,13 @@ def along_the_axis(system: System, between: tuple[float, float], hz: float, *, d
     )
 
 
-AXIS = [1, 16, 25, 32, 33, 48, 1832]
+AXIS, CHOSEN = [1, 16], [25, 32, 33, 48, 1832]
 MORE = [pytest.param(range(k, k + 100), marks=pytest.mark.slow) for k in range(0, 2000, 100)]
 
 
-@pytest.mark.parametrize("seeds", [AXIS, *MORE], ids=lambda seeds: f"from {seeds[0]}")
+@pytest.mark.parametrize(
+    "seeds", [AXIS, pytest.param(CHOSEN, marks=pytest.mark.slow), *MORE], ids=lambda seeds: f"from {seeds[0]}"
+)
 def test_without_following_branches(seeds: Iterable[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Contacts sought along the imaginary axis: the same truth."""
     monkeypatch.setattr(random_onsets, "onsets_of_band", along_the_axis)
@@ -219,7 +231,8 @@ def test_an_axis_that_is_not_walked_closely_is_noticed(tmp_path: Path, monkeypat
 
 
 # One comes into the band beside an onset, while others grow above it; growth that may be rounding beside an onset.
-@pytest.mark.parametrize("seed", [pytest.param(1568, marks=pytest.mark.slow), 1934])
+@pytest.mark.slow  # in each run: the next one
+@pytest.mark.parametrize("seed", [1568, 1934])
 def test_the_truth_sees_each_onset_that_is_lost(seed: int, tmp_path: Path) -> None:
     problem = random_problem(seed)
     found = problem.solve(tmp_path)

@@ -36,7 +36,7 @@ def two_freedoms(slip: float = -1.0) -> System:
 
 
 @pytest.mark.parametrize("source", [None, "receptance", "krylov", "full"])
-@pytest.mark.parametrize("band_hz", [0.2, 1.0, 10.0])
+@pytest.mark.parametrize("band_hz", [0.2, pytest.param(1.0, marks=pytest.mark.slow), 10.0])
 def test_it_is_refused_whatever_the_band_and_the_source(band_hz, source):
     system = two_freedoms()
     says = r"at μ = 1\.66666667: .*Painlevé"

@@ -65,7 +65,7 @@ def test_a_column_that_buckles(damping: float):
     assert [o.frequency_hz for o in found] == [0.0, 0.0]
 
 
-@pytest.mark.parametrize("seeds", [range(6), pytest.param(range(1000), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seeds", [range(2), pytest.param(range(1000), marks=pytest.mark.slow)])
 def test_columns_that_buckle_in_any_basis(seeds):
     """Where k − p is zero only rounding is left of that mode's entries: their size is that of k and p."""
     for seed in seeds:
@@ -168,7 +168,7 @@ def disagreement(seed: int) -> str:
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(4), range(5, 10), pytest.param([4, *range(10, 15)], marks=pytest.mark.slow)], ids=str
+    "seeds", [range(2), *(pytest.param(k, marks=pytest.mark.slow) for k in (range(2, 10), range(10, 15)))], ids=str
 )
 def test_random_problems(seeds: Sequence[int]):
     wrong = [words for seed in seeds if (words := disagreement(seed))]

@@ -94,7 +94,7 @@ def crossed(problem, spectrum) -> np.ndarray:
 
 
 @pytest.mark.parametrize("singular", [False, True])
-@pytest.mark.parametrize(("n", "seed"), [(30, 1), (90, 2), (160, 3)])
+@pytest.mark.parametrize(("n", "seed"), [(30, 1), (90, 2), pytest.param(160, 3, marks=pytest.mark.slow)])
 def test_same_as_qz_of_the_companion_form(n, seed, singular):
     problem = scattered(n, seed, singular=singular)
     region = Region.band(1.0, 10.0, above=-40.0)
@@ -108,6 +108,7 @@ def test_same_as_qz_of_the_companion_form(n, seed, singular):
     assert spectrum.factorisations == len(spectrum.completeness.discs)
 
 
+@pytest.mark.slow  # in each run: `test_same_as_qz_of_the_companion_form`
 def test_large_dense_reference_without_left_vectors():
     problem = scattered(300, 5)
     region = Region.box(-3.0, 60.0, 20.0, 60.0)
@@ -190,7 +191,7 @@ def test_exceptional_point_of_a_circulatory_pair(n):
     assert spectrum.completeness.complete
 
 
-@pytest.mark.parametrize("n", [40, 150])
+@pytest.mark.parametrize("n", [40, pytest.param(150, marks=pytest.mark.slow)])
 def test_rigid_body_motion_and_overdamped_real_pairs(n):
     free = chain(n).tolil()
     free[0, 0] = free[n - 1, n - 1] = 1.0
@@ -392,6 +393,7 @@ def test_a_motion_with_neither_mass_nor_stiffness_is_an_error(n):
         find_modes(quadratic(np.diag(flat), np.zeros((n, n)), np.diag(flat)), Region.box(-1, 1, 0, 2))
 
 
+@pytest.mark.slow  # in each run: `test_same_as_qz_of_the_companion_form`
 def test_a_grid_of_five_thousand_freedoms_as_arpack_has_it():
     a, b = 71, 70
     plate = sp.csr_array(sp.kron(chain(a), sp.eye_array(b)) + 1.7 * sp.kron(sp.eye_array(a), chain(b)))
@@ -482,7 +484,7 @@ def test_fast_eigenvalues_are_not_taken_for_infinite_ones() -> None:
 
 
 @pytest.mark.parametrize("left", [False, True])
-@pytest.mark.parametrize(("n", "seed"), [(160, 3), (200, 11), (250, 4)])
+@pytest.mark.parametrize(("n", "seed"), [(160, 3), *(pytest.param(*of, marks=pytest.mark.slow) for of in ((200, 11), (250, 4)))])
 def test_a_region_on_the_real_axis_is_searched_in_real_arithmetic(n, seed, left, monkeypatch):
     problem = scattered(n, seed, singular=seed == 4)
     region = Region.band(0.0, 8.0, above=-2.0)

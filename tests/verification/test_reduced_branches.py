@@ -35,7 +35,7 @@ def answered(bench: st.Case, tmp_path_factory: pytest.TempPathFactory) -> tuple[
     return study, reduced_rows.made(study, bench, np.array(list(BOX.values())).T, tmp_path_factory.mktemp("box") / "m-modes")
 
 
-@pytest.mark.parametrize("count", [12, pytest.param(300, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [3, pytest.param(300, marks=pytest.mark.slow)])
 def test_numbers_are_those_of_the_full_problem(bench: st.Case, answered, count: int) -> None:
     study, reduced = answered
     random, known, modes = np.random.default_rng(count), 0, 0

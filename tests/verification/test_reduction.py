@@ -100,7 +100,7 @@ def random_points(problem: ParametricProblem, count: int, seed: int) -> list[dic
 def test_every_mode_in_the_band_everywhere_in_the_box(model):
     problem = model.problem
     corners = problem.corners([2, 2])
-    for point in [*corners, *random_points(problem, 4, 1)]:
+    for point in [*corners, *random_points(problem, 1, 1)]:
         whole = eigenvalues(problem, point)
         exact = whole[np.abs(whole) < 0.999 * model.frequency]
         found = model.modes(point)
@@ -209,7 +209,7 @@ def test_dense_modes_that_are_about_to_meet_do_not_take_the_companion_matrix(mon
     assert dense_modes(*unsettled, top, 1.0).whole
 
 
-@pytest.mark.parametrize("first", [0, 150])
+@pytest.mark.parametrize("first", [0, pytest.param(150, marks=pytest.mark.slow)])
 def test_strong_dashpots_far_from_the_band_bring_modes_into_it(first):
     """What is solved through the undamped modes has every mode that the whole companion matrix has: of 3000 such problems
     222 lacked some, growing ones among them, before the damping of modes far away was looked at."""
@@ -306,9 +306,9 @@ def test_one_mode_that_gyroscopic_forces_bring_into_the_band(near: float, far: f
     assert len(found.values) == 2
 
 
-def strongly_damped() -> ParametricProblem:
+def strongly_damped(n: int = 10) -> ParametricProblem:
     """The rotor with dampers far beyond critical at places of their own."""
-    problem = rotor()
+    problem = rotor(n)
     rng = np.random.default_rng(5)
     strength = np.zeros(problem.size)
     strength[rng.choice(problem.size, 12, replace=False)] = 10 ** rng.uniform(1.0, 2.0, 12)
@@ -316,17 +316,18 @@ def strongly_damped() -> ParametricProblem:
     return ParametricProblem((*problem.terms, dampers), problem.parameters)
 
 
-@pytest.fixture(scope="module")
-def damped():
-    return reduce(strongly_damped(), FREQUENCY_HZ, bound=1e-8)
+@pytest.fixture(scope="module", params=[7, pytest.param(10, marks=pytest.mark.slow)])
+def damped(request):
+    return reduce(strongly_damped(request.param), FREQUENCY_HZ, bound=1e-8)
 
 
-def test_overdamped_modes_are_found_among_states(damped):
+@pytest.mark.parametrize("points", [0, pytest.param(6, marks=pytest.mark.slow)])
+def test_overdamped_modes_are_found_among_states(damped, points):
     problem = damped.problem
     assert damped.whole
     assert damped.states is not None
     assert damped.states.count < 1.4 * damped.size
-    for point in [*problem.corners([2, 2]), *random_points(problem, 6, 4)]:
+    for point in [*problem.corners([2, 2]), *random_points(problem, points, 4)]:
         whole = eigenvalues(problem, point)
         exact = whole[np.abs(whole) < 0.999 * damped.frequency]
         found = damped.modes(point)
@@ -367,8 +368,9 @@ def test_left_residuals_are_those_of_the_transposed_problem():
         assert found == pytest.approx(side.residual(lam, x), rel=1e-12)
 
 
-def test_onsets_along_any_parameter_are_those_of_the_full_problem(model):
-    for name, fixed in (("mu", {"Omega": 0.8}), ("Omega", {"mu": 0.5})):
+@pytest.mark.parametrize("given", [("mu", {"Omega": 0.8}), pytest.param(("Omega", {"mu": 0.5}), marks=pytest.mark.slow)])
+def test_onsets_along_any_parameter_are_those_of_the_full_problem(model, given):
+    for name, fixed in (given,):
         found = onsets_along(model, name, fixed)
         assert found
         (own,) = (p for p in model.problem.parameters if p.name == name)

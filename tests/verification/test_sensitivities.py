@@ -133,8 +133,8 @@ BEAMS += ["bodies.beam1.thickness", "bodies.beam1.width"]
 @pytest.mark.parametrize(
     ("stiffness", "damped"),
     [
-        *((1e9, True), ("rigid", False)),
-        *(pytest.param(*p, marks=pytest.mark.slow) for p in ((1e9, False), ("rigid", True))),
+        (1e9, True),
+        *(pytest.param(*p, marks=pytest.mark.slow) for p in ((1e9, False), ("rigid", True), ("rigid", False))),
     ],
 )
 def test_two_beams(stiffness, damped):
@@ -253,7 +253,7 @@ def test_contact_taken_away_where_it_matters_little(stiffness):
 def test_map_of_damping_is_that_of_dense_bisection():
     model = loads(MINIMAL)
     found = damping_map(
-        model, "dashpots.x.damping", "dashpots.y.damping", x_range=[0.05, 0.3, 1.0, 2.0], y_range=[0.05, 0.6, 1.5]
+        model, "dashpots.x.damping", "dashpots.y.damping", x_range=[0.05, 0.3, 2.0], y_range=[0.05, 0.6, 1.5]
     )
     assert found.undamped_mu == pytest.approx(0.4, rel=1e-9)
     for i, j in np.ndindex(found.onset_mu.shape):
@@ -265,8 +265,8 @@ def test_map_of_damping_is_that_of_dense_bisection():
     # Hoffmann and Gaul (2003): damping of one of the two modes alone lowers the onset, below that without damping.
     assert found.more_x_lowers[1, 0]
     assert not found.more_x_lowers[0, 2]
-    assert found.below_undamped[3, 0]
-    assert not found.below_undamped[3, 2]
+    assert found.below_undamped[2, 0]
+    assert not found.below_undamped[2, 2]
 
 
 def test_map_has_no_slopes_where_nothing_is_damped():

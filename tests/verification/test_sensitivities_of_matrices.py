@@ -64,7 +64,7 @@ def differences(case: st.Case, path: str, found: Sensitivities, mu: float, dampe
     return (8 * (at(h) - at(-h)) - (at(2 * h) - at(-2 * h))) / (12 * h)
 
 
-@pytest.mark.parametrize("damped", [True, False])
+@pytest.mark.parametrize("damped", [True, pytest.param(False, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("make", "paths"),
     [

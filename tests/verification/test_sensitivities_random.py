@@ -78,7 +78,7 @@ def hold(seed: int) -> int:
 
 
 # Falling friction, with a rigid contact too, and one among Coulomb's.
-@pytest.mark.parametrize("seed", [3, pytest.param(9, marks=pytest.mark.slow), 13])
+@pytest.mark.parametrize("seed", [*(pytest.param(k, marks=pytest.mark.slow) for k in (3, 9)), 13])
 def test_derivatives_are_those_of_modes_solved_again(seed: int) -> None:
     assert hold(seed) > 10
 
@@ -91,7 +91,7 @@ def test_derivatives_of_many_random_systems() -> None:
 COULOMB = {"law": "coulomb", "coefficient": 0.4}
 
 
-@pytest.mark.parametrize("change", [{}, {"friction": COULOMB}, {"friction": COULOMB, "cubic": 0.7}])
+@pytest.mark.parametrize("change", [{}, pytest.param({"friction": COULOMB}, marks=pytest.mark.slow), {"friction": COULOMB, "cubic": 0.7}])
 def test_a_compliance_takes_steady_sliding_along_as_its_stiffness_does(change: dict[str, object]) -> None:
     """d/d(1/K) = −K² d/dK: with a slope of friction, a cubic spring that is stretched, and contact that hardens."""
     cubic = {"springs.n.cubic": 0.5} if "friction" in change else {}

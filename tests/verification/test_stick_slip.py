@@ -288,7 +288,7 @@ def dense_modes(system: System, found: SurfaceSliding, mu: float) -> np.ndarray:
     return values[np.argsort(values.imag)]
 
 
-@pytest.mark.parametrize("stiffness", ["rigid", 1e13])
+@pytest.mark.parametrize("stiffness", [pytest.param("rigid", marks=pytest.mark.slow), 1e13])
 def test_modes_hold_the_nodes_that_stick(stiffness):
     case = st.load(PAD).with_({"contacts.rub.stiffness": stiffness})
     found, system = st.steady_sliding(case, 0.4), st.build_system(case)

@@ -60,7 +60,10 @@ def test_modes_without_branches(damping: float, monkeypatch: pytest.MonkeyPatch)
         assert "branches were not followed: branches cannot be told apart" in found.completeness[row]
 
 
-@pytest.mark.parametrize("case", [bench(5e-7), bench(2e-6, (10, 30)).with_({"bodies.beam1.damping.stiffness": 0.0})])
+UNDAMPED = {"bodies.beam1.damping.stiffness": 0.0}
+
+
+@pytest.mark.parametrize("case", [bench(5e-7), pytest.param(bench(2e-6, (10, 30)).with_(UNDAMPED), marks=pytest.mark.slow)])
 def test_modes_far_above_the_band_are_not_of_it_where_they_are_overdamped(case: st.Case) -> None:
     """Half of the poles that no contact sees have no frequency; their rates are hundreds of thousands a second."""
     true = dense(case, 0.3)
@@ -112,7 +115,7 @@ def test_small_problems_that_discs_do_not_get_through_are_solved_whole(monkeypat
     assert by_qz.residual.max() <= find.CROWDED
 
 
-@pytest.mark.parametrize(("first", "second", "number"), [(1e-5, 1e-5, 0), (1e-5, 1e-7, 5), (1e-4, 1e-7, 6)])
+@pytest.mark.parametrize(("first", "second", "number"), [(1e-5, 1e-5, 0), (1e-5, 1e-7, 5), pytest.param(1e-4, 1e-7, 6, marks=pytest.mark.slow)])
 def test_onsets_without_branches(first: float, second: float, number: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """As many modes grow at every μ of a grid as the onsets say."""
     case = bench(first, (6, 12)).with_({"bodies.beam2.damping.stiffness": second})

@@ -199,7 +199,7 @@ def test_amplification_matrix(beta2, damping, path):
 
 
 @pytest.mark.parametrize("path", PATHS)
-@pytest.mark.parametrize("beta2", [0.5, 0.75, 1.0])
+@pytest.mark.parametrize("beta2", [0.75, *(pytest.param(b, marks=pytest.mark.slow) for b in (0.5, 1.0))])
 def test_stable_just_below_the_limit_and_not_just_above(beta2, path):
     """The undamped limit √(2/β2)/ω_max: bounded at 0.999 of it, gone at 1.001."""
     system = chain(damping=(0.0, 0.0))

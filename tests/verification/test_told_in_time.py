@@ -25,7 +25,7 @@ pytestmark = pytest.mark.verification
 FEW = (0, 4, 15, 19, 41, 50, 59)
 
 
-@pytest.mark.parametrize("seed", [*FEW, *(pytest.param(s, marks=pytest.mark.slow) for s in range(60, 200))])
+@pytest.mark.parametrize("seed", [*FEW[:3], *(pytest.param(s, marks=pytest.mark.slow) for s in (*FEW[3:], *range(60, 200)))])
 def test_the_fastest_of_random_systems_is_seen_in_time(seed: int) -> None:
     """A band of 50 Hz for modes below 1 Hz, and contacts that do not all move in the fastest mode."""
     made = random_rubbing(seed)

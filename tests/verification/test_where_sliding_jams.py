@@ -69,7 +69,7 @@ def test_onsets_below_the_friction_at_which_something_jams() -> None:
 @pytest.mark.parametrize("coefficient", [pytest.param(0.3, marks=pytest.mark.slow), 1.5])
 def test_what_is_asked_for_does_not_depend_on_a_case_that_jams_at_its_own_friction(coefficient: float) -> None:
     case = two_masses(coefficient)
-    found = st.onsets(case, (0.0, 1.0))
+    found = st.onsets(case, (0.6, 0.9))
     assert [o.mu for o in found.onsets] == pytest.approx([0.75], rel=1e-9)
     assert found.complete
     modes = st.modes(case, [0.5, 0.8])
@@ -122,7 +122,7 @@ def test_a_map_of_dampings_below_the_case_s_own_friction() -> None:
     usual, jammed = (
         st.damping_map(
             two_masses(mu).with_(linear), "springs.k1.damping", "springs.k2.damping", x_range=(0.01, 0.05),
-            y_range=(0.01, 0.05), grid=(2, 2), mu_range=(0.0, 1.0), method="full",
+            y_range=(0.01, 0.05), grid=(2, 2), mu_range=(0.6, 0.9), method="full",
         )
         for mu in (0.3, 1.5)
     )  # fmt: skip
