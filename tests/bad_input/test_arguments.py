@@ -62,6 +62,16 @@ CASE = mode_coupling(0.02, 0.1)
         ),
         (lambda: st.compare(CASE, [0.5], only="foo"), "only: 'foo' – of what is compared: growth, run, critical"),
         (lambda: st.compare(CASE, [0.5], only=3.5), "only: 3.5 – a name, or a list of names"),  # type: ignore[arg-type]
+        (lambda: st.compare(CASE, [0.5], only=[]), "only: [] – a name, or a list of names"),
+        (lambda: st.sensitivities(CASE, [], mu=1.2), "parameters: [] – a name, or a list of names"),
+        (lambda: st.sensitivities(CASE, "mu", mu=1.2, modes=[]), "modes: [] – numbers of branches from 1 to 2"),
+        (
+            lambda: st.rank_countermeasures(CASE, mu=1.2, margin=float("nan")),
+            "margin: nan – a damping ratio, at least 0 and below 1",
+        ),
+        (lambda: st.rank_countermeasures(CASE, mu=1.2, margin=-1.0), "margin: -1.0 – a damping ratio, at least 0 and below 1"),
+        (lambda: st.rank_countermeasures(CASE, mu=1.2, numbers=[]), "numbers: [] – a name, or a list of names"),
+        (lambda: st.build_system(CASE, mu="abc"), "mu: 'abc' – a number, or None"),  # type: ignore[arg-type]
         (lambda: st.run(CASE, "never", only=3.5), "only: 3.5 – a name, or a list of names"),  # type: ignore[arg-type]
     ],
 )
@@ -86,6 +96,15 @@ def test_one_name_may_stand_without_a_list() -> None:
         st.sensitivities(CASE, "nu", mu=1.2)
     found = st.rank_countermeasures(CASE, mu=1.2, numbers="springs.k1.stiffness", added_mass=False, verify=0)
     assert {m.name for m in found.measures} <= {"springs.k1.stiffness"}
+
+
+def test_friction_coefficients_that_can_be_gone_through_once() -> None:
+    found = st.modes(CASE, (mu for mu in (0.2, 0.4)))
+    assert found.mu.tolist() == [0.2, 0.4]
+    with pytest.raises(CaseError, match=r"^mu: -1.0 "):
+        st.modes(CASE, iter([0.2, -1.0]))
+    with pytest.raises(CaseError, match=r"^mu: \[\] – at least one"):
+        st.modes(CASE, iter([]))
 
 
 @pytest.mark.parametrize("verb", [st.modes, st.simulate, st.compare, st.cycles, st.steady_sliding])

@@ -95,7 +95,7 @@ def modes(
     keeps the modes, with vectors those at one μ. Raises CaseError for a bad μ, AnalysisError where the steady sliding
     state exists at none of them.
     """
-    require_friction(mu)
+    mu = require_friction(mu)
     require_frequency(max_frequency_hz)
     if count is not None:
         require_count(count, "count")
@@ -418,7 +418,7 @@ def compare(
     sought (`io.kept_parts`); finished is called with each μ when it is done. Ctrl-C returns what is finished.
     """
     started = time.perf_counter()
-    require_friction(mus)
+    mus = require_friction(mus)
     work = Workspace.of(problem)
     settings, system = work.comparison, work.structured("compare")
     require_pressed_in_time(work, system, "compare", steady=True)

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, cast
 
 from ..asking import is_number
 from ..errors import CaseError
 
 
-def require_friction(mus: float | Iterable[float] | None, where: str = "mu", *, several: bool = True) -> None:
+def require_friction(mus: float | Iterable[float] | None, where: str = "mu", *, several: bool = True) -> Any:
     """Refuse friction coefficients that are none: negative, not finite, text, an empty list, a list where ``several``
-    is false. Raises CaseError."""
+    is false. Gives them back, as a list what can be gone through once only. Raises CaseError."""
     given: Any = mus
+    if several and isinstance(given, Iterable) and not isinstance(given, str | Mapping | Sequence):
+        given = given if hasattr(given, "ndim") else list(cast("Iterable[Any]", given))
     values: list[Any] = [] if given is None else [given]
     if isinstance(given, Iterable) and not isinstance(given, str | Mapping) and getattr(given, "ndim", 1):
         values = list(cast("Iterable[Any]", given)) if several else [given]
@@ -23,6 +25,7 @@ def require_friction(mus: float | Iterable[float] | None, where: str = "mu", *, 
         value = value.item() if getattr(value, "ndim", None) == 0 else value  # an array of one number is one
         if not is_number(value) or not 0.0 <= value < math.inf:
             raise CaseError(where, value, "a friction coefficient is a finite number ≥ 0")
+    return given
 
 
 def require_band(band_hz: tuple[float, float] | None, top: float, where: str = "band_hz") -> None:
@@ -72,13 +75,13 @@ def require_choice(given: Any, where: str, accepted: Iterable[str | bool | None]
 
 
 def names_of(given: str | Iterable[str], where: str) -> tuple[str, ...]:
-    """Names as a list of them; one may stand by itself. Raises CaseError for anything else."""
+    """Names as a list of them; one may stand by itself. Raises CaseError for anything else, and for none."""
     if isinstance(given, str):
         return (given,)
     try:
         names: tuple[Any, ...] = tuple(given)
     except TypeError:
         names = (None,)
-    if not all(isinstance(name, str) for name in names):
+    if not names or not all(isinstance(name, str) for name in names):
         raise CaseError(where, given, "a name, or a list of names")
     return names

@@ -67,6 +67,8 @@ def rank_countermeasures(
     started = time.perf_counter()
     if not 0.0 < percent < 100.0:
         raise CaseError("percent", percent, "a size of change between 0 and 100 %")
+    if not 0.0 <= margin < 1.0:
+        raise CaseError("margin", margin, "a damping ratio, at least 0 and below 1")
     require_count(verify, "verify", least=0)
     require_count(chamfers, "chamfers", least=0)
     require_frequency(max_frequency_hz)

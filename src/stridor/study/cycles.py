@@ -72,7 +72,7 @@ def cycles(
     where nothing slides, AnalysisError where steady sliding does not exist.
     """
     started = time.perf_counter()
-    require_friction(mu)
+    mu = require_friction(mu)
     work = Workspace.of(problem)
     values = [] if mu is None else [float(value) for value in np.ravel(np.asarray(mu, dtype=float))]
     pushes = None if push is None else [float(p) for p in np.ravel(np.asarray(push, dtype=float))]

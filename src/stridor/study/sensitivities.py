@@ -347,12 +347,12 @@ class Linearised:
         given: Any = choice
         listed = isinstance(given, Iterable) and not isinstance(given, str)
         missing = [number for number in choice if number not in where] if listed else [given]
-        if missing:
+        if missing or not len(choice):
             numbers = f"from 1 to {len(where)}" if where else "(the band has none)"
             accepted = f"numbers of branches {numbers}"
             if not listed:
                 raise CaseError("modes", given, f'"unstable", "all" or a list of {accepted}')
-            raise CaseError("modes", missing, accepted)
+            raise CaseError("modes", missing or choice, accepted)
         return [where[number] for number in choice]
 
     def gap(self, column: int) -> float:

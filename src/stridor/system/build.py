@@ -8,6 +8,7 @@ from os import PathLike
 import numpy as np
 import scipy.sparse as sp
 
+from ..asking import NUMBER
 from ..case import Case, load
 from ..case.bodies import MassBody, SolidBody
 from ..case.points import BoundaryRef
@@ -47,6 +48,7 @@ def build_system(
     if not isinstance(case, Case):  # pyright: ignore[reportUnnecessaryIsInstance]
         accepted = "a case or the path of its file; the system of a workspace is work.system()"
         raise CaseError("case", kind_of(case), accepted)
+    NUMBER.or_none().require(mu, "mu")
     stage("matrices of the bodies")
     bodies = build_bodies(case, mu, known)
     total = sum(body.size for body in bodies.values())
