@@ -63,8 +63,9 @@ def chosen_parts(
 
 def _names(given: str | Collection[str] | None, where: str) -> set[str]:
     """Names as given, several with commas in one. Raises CaseError."""
-    none = given is None or (isinstance(given, list | tuple | set | frozenset) and not given)  # as it is by default
-    names = [name.strip() for text in (() if none else names_of(given, where)) for name in text.split(",")]
+    if given is None or (isinstance(given, list | tuple | set | frozenset) and not given):
+        return set()
+    names = [name.strip() for text in names_of(given, where) for name in text.split(",")]
     for name in names:
         if name not in (*PARTS, *OF_COMPARISON):
             accepted = f"{', '.join(PARTS)}; of the comparison {', '.join(OF_COMPARISON)}"
