@@ -33,13 +33,14 @@ def solved(matrix: Array, right: Array) -> Array | None:
         return right
     if not (np.isfinite(matrix).all() and np.isfinite(right).all()):
         return None
-    *_, solution, regularity, _, _, info = sl.lapack.dgesvx(matrix, right[:, None])
-    if info != 0 or not regularity > REGULAR:
-        return None
-    answer: Array = solution[:, 0]
-    # LAPACK's own bound is one where an unknown that nothing asks for is zero.
-    terms = np.abs(matrix) @ np.abs(answer) + np.abs(right)
-    return answer if np.all(np.abs(right - matrix @ answer) <= SOLVED * terms) else None
+    with np.errstate(all="ignore"):
+        *_, solution, regularity, _, _, info = sl.lapack.dgesvx(matrix, right[:, None])
+        if info != 0 or not regularity > REGULAR:
+            return None
+        answer: Array = solution[:, 0]
+        # LAPACK's own bound is one where an unknown that nothing asks for is zero.
+        terms = np.abs(matrix) @ np.abs(answer) + np.abs(right)
+        return answer if np.all(np.abs(right - matrix @ answer) <= SOLVED * terms) else None
 
 
 @dataclass(frozen=True)

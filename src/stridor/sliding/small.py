@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..direct.dense import solved
 from ..system import System
@@ -29,10 +30,11 @@ class Small:
         """Of a system with few unknowns; None of others."""
         if system.size + normal.shape[0] > SMALL:
             return None
-        rows = np.zeros((0, system.size)) if system.cubic is None else system.cubic.rows.free.toarray()
-        dense = normal.toarray()
-        return cls(system.stiffness.toarray(), dense, dense if push is normal else push.toarray(), rows)
+        rows = np.zeros((0, system.size)) if system.cubic is None else _dense(system.cubic.rows.free)
+        dense = _dense(normal)
+        return cls(_dense(system.stiffness), dense, dense if push is normal else _dense(push), rows)
 
+    @np.errstate(all="ignore")  # of friction beyond all bounds: what is not finite has no answer here
     def answer(
         self, tangent: Any, right: Array, springs: tuple[IntArray, Array], rigid: tuple[IntArray, Array, Array],
         scale: float, gap: Array,
@@ -59,3 +61,7 @@ class Small:
             matrix[range(n, size), range(n, size)] = softness
             given[n:] = held * scale * gap[bordering]
         return solved(matrix, given)
+
+
+def _dense(matrix: Any) -> Array:
+    return np.asarray(matrix.toarray() if sp.issparse(matrix) else matrix)
