@@ -117,6 +117,7 @@ def test_a_run_grows_is_stopped_and_waits_for_its_turn(browser: Any, endless: tu
         expect(page.locator("#st-run-go")).to_be_enabled()
 
 
+@pytest.mark.slow
 def test_a_reload_in_the_middle_of_a_run_ends_it_and_the_page_goes_on(browser: Any, endless: tuple[Any, str]) -> None:
     server, address = endless
     with page_at(browser, address, lost=True) as page:
@@ -203,6 +204,7 @@ def test_a_click_on_the_map_goes_there(browser: Any, short: str) -> None:
         expect(page.locator("#st-map-go")).to_be_enabled()
 
 
+@pytest.mark.slow
 def test_another_case_has_nothing_of_the_one_before(browser: Any, short: str) -> None:
     with page_at(browser, short) as page:
         page.get_by_role("tab", name="Stability map").click()

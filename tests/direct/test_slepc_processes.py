@@ -196,7 +196,7 @@ def alone(bench: Path) -> np.ndarray:
     [
         pytest.param("bench.toml --solver slepc", 2, marks=pytest.mark.slow),  # the next test starts it so, too
         ("asks.toml", 2),
-        ("bench.toml --solver slepc", None),
+        pytest.param("bench.toml --solver slepc", None, marks=pytest.mark.slow),
     ],
 )
 def test_a_bench_with_contact_has_the_modes_of_the_default_solver(bench: Path, alone, words: str, processes: int | None):
@@ -209,6 +209,7 @@ def test_a_bench_with_contact_has_the_modes_of_the_default_solver(bench: Path, a
 
 
 @needs_slepc
+@pytest.mark.slow
 def test_a_bench_with_contact_has_the_modes_that_slepc_finds(bench: Path):
     found = eigenvalues(stridor("modes", "bench.toml", "--mu", "0.4", "--json", "--solver", "slepc", cwd=bench.parent))
     problem = contact_parameters(st.build_system(st.load(bench)), (0.0, 0.6)).at({"mu": 0.4})

@@ -240,11 +240,12 @@ def _solve(system: System, force: Array, mu: Array, sense: Array, active: BoolAr
         softness = np.array([c.compliance for c in contacts]) * scale * scale
     softness = np.minimum(softness, SOFTEST)
     right = np.concatenate([force, [-c.gap * scale for c in contacts]])
-    bordered, answer = _dense(system, normals * scale, push * scale, softness, right)
-    if answer is None:
-        bordered, answer = _sparse(system, normals * scale, push * scale, softness, right)
     size = system.size
     with np.errstate(all="ignore"):
+        normals, push = normals * scale, push * scale
+        bordered, answer = _dense(system, normals, push, softness, right)
+        if answer is None:
+            bordered, answer = _sparse(system, normals, push, softness, right)
         terms = np.abs(bordered) @ np.abs(answer) + np.abs(right)
         residual = float(np.abs(bordered @ answer - right).max() / max(terms.max(), 1e-300))
     if not np.isfinite(residual) or residual > 1e-8 or _loose(answer[:size], system):
@@ -273,17 +274,16 @@ def _dense(system: System, normal: Array, push: Array, softness: Array, right: A
 
 def _sparse(system: System, normal: Array, push: Array, softness: Array, right: Array) -> tuple[Any, Array]:
     """The bordered matrix and the answer (n + m,), not finite where the matrix is singular."""
-    with np.errstate(all="ignore"):
-        bordered = sp.block_array(
-            [[system.stiffness, sp.csr_array(-push.T)], [sp.csr_array(normal), sp.csr_array(np.diag(softness))]],
-            format="csc",
-        )
-        try:
-            solver = spl.splu(bordered, permc_spec="COLAMD")
-            answer = solver.solve(right)
-            return bordered, answer + solver.solve(right - bordered @ answer)
-        except RuntimeError:
-            return bordered, np.full(len(right), np.nan)
+    bordered = sp.block_array(
+        [[system.stiffness, sp.csr_array(-push.T)], [sp.csr_array(normal), sp.csr_array(np.diag(softness))]],
+        format="csc",
+    )
+    try:
+        solver = spl.splu(bordered, permc_spec="COLAMD")
+        answer = solver.solve(right)
+        return bordered, answer + solver.solve(right - bordered @ answer)
+    except RuntimeError:
+        return bordered, np.full(len(right), np.nan)
 
 
 def _twice(system: System, active: BoolArray) -> str:
