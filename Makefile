@@ -42,8 +42,12 @@ mutants: $(STAMP)  ## do the tests notice small faults? (a sample: MUTANTS="--sa
 	  --target build/mutants/tools cosmic-ray==8.7.0
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/mutants/mutate.py $(MUTANTS)
 
-bench: $(STAMP)  ## the benchmarks in short mode (LANES=2: two at once, which disturb each other)
-	@ls benchmarks/[!_]*.py | xargs -P $(LANES) -n 6 $(BIN)/python benchmarks/_short.py
+# What a change can run along with its tests; the others spend their time on machine code and on runs in time, weekly.
+QUICK := boundaries damping_map direct_solvers friction_sweep krylov_modes onsets pad_on_disc quadratic_modes time_loop \
+  validation verbs viewer
+
+bench: $(STAMP)  ## the quick benchmarks in short mode (LANES=2: two at once, which disturb each other)
+	@printf 'benchmarks/%s.py\n' $(QUICK) | xargs -P $(LANES) -n 6 $(BIN)/python benchmarks/_short.py
 
 lint: $(STAMP)  ## ruff
 	$(BIN)/python -m ruff check .

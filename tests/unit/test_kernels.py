@@ -138,6 +138,7 @@ def test_the_digest_sees_every_module_that_can_enter_a_kernel_and_nothing_else(t
     assert read_sources().digest != first.digest
 
 
+@pytest.mark.slow
 def test_the_digest_of_a_zip_archive_and_kernels_that_run_from_it(tmp_path):
     archive = tmp_path / "stridor.zip"
     shutil.make_archive(str(archive.with_suffix("")), "zip", PACKAGE.parent, "stridor")

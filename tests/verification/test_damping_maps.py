@@ -50,6 +50,7 @@ def beams() -> st.Case:
     return st.loads(template_text("two-beams")).with_({"modal.max_frequency_hz": 20e3})
 
 
+@pytest.mark.slow
 def test_a_reduced_map_is_the_full_one(maps):
     full, reduced = maps["full"], maps["reduced"]
     assert (full.method, reduced.method) == ("full", "reduced")

@@ -276,6 +276,7 @@ def test_a_run_says_that_its_coefficient_takes_the_place_of_several(tmp_path: Pa
     assert st.simulate(case).notes == st.simulate(with_friction(), 0.4).notes == ()
 
 
+@pytest.mark.slow
 def test_onsets_along_the_friction_of_one_contact_leave_the_others_theirs() -> None:
     case = with_friction(back=0.1)
     found = st.onsets(case, (0.0, 0.4), along="contacts.rub.friction.coefficient")
