@@ -12,10 +12,10 @@ STAMP := .venv/.stridor-ready
 PIP = $(BIN)/python -m pip install -qq --no-input --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help env demo test weekly mutants bench lint types layers docs viewer lock clean FORCE
+.PHONY: help env demo test weekly mutants bench lint types types-strict layers docs viewer lock clean FORCE
 
 help:  ## this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 
 env: $(STAMP)  ## the environment in .venv, from the lock file
 
@@ -31,7 +31,8 @@ demo: $(STAMP)  ## the two-beam bench, from case file to report, in demo/
 test: $(STAMP)  ## all tests but the slow ones
 	OPENBLAS_NUM_THREADS=$${OPENBLAS_NUM_THREADS:-1} $(BIN)/python -m pytest -n $(JOBS) --dist worksteal $(PYTEST_ARGS)
 
-weekly: $(STAMP)  ## the slow tests, the full benchmarks and the tests of the tests
+weekly: $(STAMP)  ## the strict types, the slow tests, the full benchmarks and the tests of the tests
+	@$(MAKE) --no-print-directory types-strict
 	$(BIN)/python -m pytest -m slow $(PYTEST_ARGS)
 	@$(each_benchmark)
 	@$(MAKE) --no-print-directory mutants
@@ -52,7 +53,10 @@ bench: $(STAMP)  ## the quick benchmarks in short mode (LANES=2: two at once, wh
 lint: $(STAMP)  ## ruff
 	$(BIN)/python -m ruff check .
 
-types: $(STAMP)  ## pyright, strict, on src
+types: $(STAMP)  ## ty on src, in seconds
+	$(BIN)/python -m ty check --python $(BIN)/python --error-on-warning --no-progress
+
+types-strict: $(STAMP)  ## pyright, strict, on src: minutes; before a release or after larger changes
 	$(BIN)/python -m basedpyright --pythonpath $(BIN)/python
 
 layers: $(STAMP)  ## which part may import which

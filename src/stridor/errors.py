@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 _LONGEST_SHOWN = 60
 _LONGEST_PLACE = 400
@@ -19,7 +19,12 @@ class StridorError(Exception):
 
 
 class AnalysisError(StridorError):
-    """The case is valid, but the analysis has no answer (a contact that would pull, a singular system)."""
+    """The case is valid, but the analysis has no answer (a contact that would pull, a singular system).
+
+    trajectory: of a run in time that broke off, what there is of it (`temporal.Trajectory`); None of all others.
+    """
+
+    trajectory: Any = None
 
 
 @dataclass(frozen=True)

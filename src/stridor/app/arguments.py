@@ -346,7 +346,7 @@ def verb(
 
     def made(function: Callable[Concatenate[Call, P], None]) -> Callable[..., None]:
         case, *every = inspect.signature(_common, eval_str=True).parameters.values()
-        name = function.__name__.replace("_", "-")
+        name = function.__name__.replace("_", "-")  # ty: ignore[missing-attribute]  # typer takes functions alone
         common = [p for p in every if _has(p, name)]
         _, *own = inspect.signature(function, eval_str=True).parameters.values()
         names, options = [p.name for p in (case, *common)], _options((*own, *common))
@@ -372,7 +372,7 @@ def verb(
 
         order = (case.replace(annotation=file), *own, *common)
         # Typer takes them one by one, after one another, by keyword.
-        called.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        called.__signature__ = inspect.Signature(  # type: ignore[attr-defined]  # ty: ignore[missing-attribute]
             [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in order]
         )
         return called

@@ -103,7 +103,7 @@ def simulate(
                     work, friction, progress=progress, checkpoint=checkpoint, restart=before, changed=changed
                 )
         except AnalysisError as error:
-            part = getattr(error, "trajectory", None)
+            part = error.trajectory
             if part is not None:
                 call.keep(part, "simulate.nc")
             raise

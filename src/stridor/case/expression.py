@@ -260,7 +260,7 @@ def _raised(left: _Dual, right: _Dual) -> _Dual:
     (a, da), (b, db) = left, right
     if a == 0.0 and b < 0:
         raise _Undefined("division by zero (a negative power of zero)")
-    if a < 0 and not b.is_integer():
+    if a < 0 and not b.is_integer():  # ty: ignore[missing-union-attribute]  # all are floats
         raise _Undefined("a fractional power of a negative number is not real")
     value = a**b
     by_base = by_power = 0.0

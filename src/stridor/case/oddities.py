@@ -252,7 +252,7 @@ def _angles(case: Case) -> Iterator[str]:
 
 def radians_meant(value: float | None) -> float | None:
     """Degrees of an angle that was probably given in radians, None for all others."""
-    if not value or abs(value) > 2.0 * math.pi * 1.001 or (2.0 * value).is_integer():
+    if not value or abs(value) > 2.0 * math.pi * 1.001 or (2.0 * value).is_integer():  # ty: ignore[missing-union-attribute]
         return None
     degrees = math.degrees(value)
     # The handsomer the angle, the fewer of its digits need be written: 1.57, but 1.4835.

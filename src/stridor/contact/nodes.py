@@ -44,7 +44,7 @@ class ContactNodes:
     position: Array
     normals: Array
     tangents: Array
-    cubic: Array = None  # type: ignore[assignment]  # filled in __post_init__
+    cubic: Array = None  # type: ignore[assignment]  # ty: ignore[invalid-assignment]  # filled in __post_init__
     closed: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:

@@ -147,7 +147,7 @@ class Team:
     def _require_counts(self, matrix: Sparse) -> None:
         whole = np.dtype(self.petsc.IntType)
         most = int(np.diff(matrix.indptr[self.ranks.bounds(matrix.shape[0])].astype(np.int64)).max())
-        if max(most, matrix.shape[0]) > np.iinfo(whole).max:
+        if max(most, matrix.shape[0]) > np.iinfo(whole).max:  # ty: ignore[no-matching-overload]
             raise AnalysisError(
                 f"PETSc cannot count {most} entries of one process's {matrix.shape[0]} columns with "
                 f"{8 * whole.itemsize}-bit numbers; start more processes, or build PETSc --with-64-bit-indices"

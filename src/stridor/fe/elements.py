@@ -94,6 +94,7 @@ class Element:
 def element(kind: str) -> Element:
     """The element of a kind of cell named as in `mesh.model` (not facets). Raises KeyError for any other."""
     import skfem  # 0.2 s, needed by bodies of solids only
+    from skfem.quadrature import get_quadrature
 
     description = _KINDS[kind]
     library = getattr(skfem, description.library_name)()
@@ -101,7 +102,7 @@ def element(kind: str) -> Element:
     order = _order(nodes, np.asarray(library.doflocs, dtype=float))
 
     def rule(degree: int) -> Rule:
-        points, weights = skfem.quadrature.get_quadrature(library.refdom, degree)
+        points, weights = get_quadrature(library.refdom, degree)
         shapes = [library.lbasis(points, int(i)) for i in order]
         values = np.array([np.broadcast_to(value, weights.shape) for value, _ in shapes])
         gradients = np.array([np.broadcast_to(gradient, points.shape) for _, gradient in shapes])

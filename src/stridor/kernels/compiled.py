@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from types import FunctionType
 from typing import Any
 
 import numba
@@ -21,7 +22,7 @@ compare_quickly()
 
 
 def njit(
-    function: Callable[..., Any] | None = None, *, cache: bool = False, allocates: bool = True, **options: Any
+    function: FunctionType | None = None, *, cache: bool = False, allocates: bool = True, **options: Any
 ) -> Any:
     """Compile a function at its first call, with the options of numba's ``njit``; ``cache`` keeps the machine code.
 
@@ -31,7 +32,7 @@ def njit(
     it.
     """
 
-    def made(plain: Callable[..., Any]) -> Any:
+    def made(plain: FunctionType) -> Any:
         # Nobody calls them from C: an entry for that takes a sixth of the time to compile.
         # What cannot be divided is not a number, as in NumPy: an exception would be code beside every division.
         chosen: dict[str, Any] = {"no_cfunc_wrapper": True, "error_model": "numpy", "_nrt": allocates, **options}

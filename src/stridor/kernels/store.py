@@ -7,7 +7,8 @@ import hashlib
 import pickle
 import sys
 import uuid
-from collections.abc import Callable, Generator
+from collections.abc import Generator
+from types import FunctionType
 from typing import Any, cast
 
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
@@ -24,7 +25,7 @@ _File: Any = IndexDataCacheFile
 class _Location:
     """Where the code of one function lies, as numba asks for it."""
 
-    def __init__(self, folder: Folder, function: Callable[..., Any]) -> None:
+    def __init__(self, folder: Folder, function: FunctionType) -> None:
         self._folder = folder
         self._py_file = function.__code__.co_filename
 
@@ -38,7 +39,7 @@ class _Location:
 class _Implementation(_Way):
     """How code becomes a file: numba's way, at our place."""
 
-    def __init__(self, function: Callable[..., Any], folder: Folder, options: dict[str, Any]) -> None:
+    def __init__(self, function: FunctionType, folder: Folder, options: dict[str, Any]) -> None:
         self._lineno = function.__code__.co_firstlineno
         self._locator = _Location(folder, function)
         chosen = sorted((key, sorted(v) if isinstance(v, set) else v) for key, v in options.items())
@@ -86,7 +87,7 @@ class _Files(_File):
         return pickle.loads(content)  # our own folder; code that somebody could write there would run anyway
 
 
-def _stamp(function: Callable[..., Any]) -> str:
+def _stamp(function: FunctionType) -> str:
     """What makes code of another stamp useless: the folder stands for our sources, other modules for themselves."""
     if function.__module__.partition(".")[0] == PACKAGE:
         return ""
@@ -100,7 +101,7 @@ def _stamp(function: Callable[..., Any]) -> str:
 class KernelCache(_Cache):
     """The compiled forms of one function, in the folder for the present sources."""
 
-    def __init__(self, function: Callable[..., Any], folder: Folder, options: dict[str, Any]) -> None:
+    def __init__(self, function: FunctionType, folder: Folder, options: dict[str, Any]) -> None:
         self._name = repr(function)
         self._py_func = function
         self._folder = folder

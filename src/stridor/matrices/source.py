@@ -106,7 +106,7 @@ class MatrixFile:
                 packed_size = self.path.stat().st_size
                 limit = largest_unfolded(packed_size, unquestioned=_TEXT_UNQUESTIONED, times=_TEXT_PACKED)
                 with gzip.GzipFile(fileobj=plain) as stream:
-                    yield Stream(stream, self, limit)  # pyright: ignore[reportArgumentType]
+                    yield Stream(stream, self, limit)
         except (OSError, EOFError, zlib.error) as error:
             self.refuse(f"cannot be read: {in_one_line(error)}", error)
 
@@ -114,7 +114,7 @@ class MatrixFile:
 class Stream:
     """Bytes of a file in turn, no more than ``limit`` where that is given."""
 
-    def __init__(self, file: BinaryIO, source: MatrixFile | None = None, limit: int = 0) -> None:
+    def __init__(self, file: BinaryIO | gzip.GzipFile, source: MatrixFile | None = None, limit: int = 0) -> None:
         self._file, self._source, self._left = file, source, limit
 
     def read(self, size: int = -1) -> bytes:

@@ -223,7 +223,7 @@ def _binary_22(data: bytes, sections: dict[bytes, int]) -> tuple[IntArray, list[
     start = sections[b"Nodes"]
     at = _line_end(data, start)
     record = np.dtype([("number", "i4"), ("place", "f8", (3,))])
-    nodes = np.frombuffer(data, record, int(data[start:at]), at)["number"].astype(np.int64)
+    nodes = np.frombuffer(data, record, int(data[start:at]), at)["number"].astype(np.int64)  # ty: ignore[invalid-argument-type]
     text = _binary_count(data, at + record.itemsize * len(nodes), "Nodes", len(nodes), len(nodes))
     start = sections[b"Elements"]
     at = _line_end(data, start)

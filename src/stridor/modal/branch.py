@@ -21,7 +21,7 @@ class Branch(Rates, Tabular):
 
     number: int
     mu: Array
-    eigenvalues: ComplexArray
+    eigenvalues: ComplexArray  # ty: ignore[incompatible-attribute-override]
     residual: Array
     unstable: BoolArray
     right: ComplexArray | None = None

@@ -7,7 +7,7 @@ with constant μ this is 1/K_c + H_nn + μ s H_nt = 0, so that μ(λ) is explici
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -55,10 +55,15 @@ class Receptance:
     real: Array
     general: ComplexArray
     pairs: IntArray
+    # What every evaluation needs, multiplied out once.
+    _products: Array = field(init=False, repr=False, compare=False)
+    _gains: ComplexArray = field(init=False, repr=False, compare=False)
+    _damping: Array = field(init=False, repr=False, compare=False)
+    _stiffness: Array = field(init=False, repr=False, compare=False)
+    _poles: ComplexArray = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         first, second = self.pairs
-        # What every evaluation needs, multiplied out once.
         products = self.real[first] * self.real[second]
         # Modes that no wanted entry sees would only divide by zero where a root crosses them.
         seen = np.flatnonzero(np.any(products != 0.0, axis=0))
@@ -71,7 +76,7 @@ class Receptance:
     @property
     def sums(self) -> tuple[Array, Array, Array]:
         """Damping c (n,), stiffness ω² (n,) and products of rows (p, n) of the real modes that wanted entries see."""
-        return self._damping, self._stiffness, self._products  # type: ignore[attr-defined]
+        return self._damping, self._stiffness, self._products
 
     def __call__(self, lam: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
         """H and dH/dλ (k, r, r) at λ (k,)."""
@@ -89,18 +94,18 @@ class Receptance:
         real_mode_sums(
             np.ascontiguousarray(lam.real),
             np.ascontiguousarray(lam.imag),
-            self._damping,  # type: ignore[attr-defined]
-            self._stiffness,  # type: ignore[attr-defined]
-            self._products,  # type: ignore[attr-defined]
+            self._damping,
+            self._stiffness,
+            self._products,
             sums,
         )
         both = sums.view(complex)
         value, slope = both[..., 0], both[..., 1]
         if self.general.shape[1]:
-            gain = self._gains  # type: ignore[attr-defined]
+            gain = self._gains
             # On a pole to the last bit this is not a number, as the sums over real modes are not; who asks sees it.
             with np.errstate(divide="ignore", invalid="ignore"):
-                inverse = 1.0 / (lam[:, None] - self._poles)  # type: ignore[attr-defined]
+                inverse = 1.0 / (lam[:, None] - self._poles)
                 value = value + inverse @ gain
                 slope = slope - inverse**2 @ gain
         return value, slope

@@ -48,7 +48,7 @@ class ComplexModes(Rates, Tabular):
     """
 
     mu: Array
-    eigenvalues: ComplexArray
+    eigenvalues: ComplexArray  # ty: ignore[incompatible-attribute-override]
     branch: IntArray
     residual: Array
     damped: bool

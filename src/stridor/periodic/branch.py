@@ -115,7 +115,7 @@ def _between(one: Cycle, other: Cycle) -> list[Kind]:
     found: list[Kind] = []
     for kind, word in WORDS.items():
         if (kind in one.kinds) != (kind in other.kinds):
-            found.append(f"{word} {'begins' if kind in other.kinds else 'ends'}")  # type: ignore[arg-type]
+            found.append(f"{word} {'begins' if kind in other.kinds else 'ends'}")  # type: ignore[arg-type]  # ty: ignore[invalid-argument-type]
     return found if found or _alike(one, other) else ["contacts change in another order"]
 
 

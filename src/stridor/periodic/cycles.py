@@ -236,7 +236,7 @@ def _read(data: Any, k: int, told: Any, names: tuple[str, ...], points: tuple[st
     )
     if any(c.contact not in names or len(c.behind) != len(names) for c in changes):
         raise ValueError("changes of contacts that there are not")
-    numbers = {name: float(data[name].values[k]) for name in NUMBERS}
+    numbers: dict[str, Any] = {name: float(data[name].values[k]) for name in NUMBERS}
     series = _method(told) == "harmonic"
     if np.isfinite(numbers["grazed"]) == series or np.isfinite(numbers["defect"]) != series:
         raise ValueError("grazed is what shooting tells, defect harmonic balance")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..contact.nodes import ContactNodes
-from ..system import System
+from ..system import Line, System
 from ..typing import Array, BoolArray
 
 
@@ -89,7 +89,7 @@ def balance(system: System, force: Array, contact_force: Array) -> Balance:
 def _rigid_motions(system: System) -> Iterator[tuple[bool, Array]]:
     """Rigid motions (n,) of each drawn body's free freedoms, and whether they rotate."""
     for body in (*system.lines, *system.solids):
-        points = body.coordinates if hasattr(body, "coordinates") else body.points  # type: ignore[union-attr]
+        points = body.coordinates if isinstance(body, Line) else body.points
         d = points.shape[1]
         for k in range(d):
             shift = np.zeros_like(points)

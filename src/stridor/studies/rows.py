@@ -14,7 +14,7 @@ from ..case import Case
 from ..errors import StridorError
 from ..modal.full import ParametricOnsets
 from ..modal.growing import doubt
-from ..modal.onset import Onsets
+from ..modal.onset import Onset, Onsets
 from ..modal.results import grows
 from ..study.analyses import compare, modes, onsets, simulate, steady_sliding, summarise
 from ..study.workspace import Unsaved, Workspace
@@ -110,7 +110,7 @@ def onsets_row(found: Onsets | ParametricOnsets, keep: int, *, complete: bool, g
     """Onsets of a row, by friction coefficient; the first from which on something grows apart: where something does at
     the low end of the range, that end."""
     listed = list(found)[:keep]
-    values = [o.mu if isinstance(found, Onsets) else o.value for o in listed]  # type: ignore[union-attr]
+    values = [o.mu if isinstance(o, Onset) else o.value for o in listed]
     begins = [k for k, o in enumerate(listed) if not o.stabilising]
     row: Row = {
         "onset_mu": np.array(values, dtype=float),

@@ -56,8 +56,12 @@ class SampleBatch:
     def without(self, done: Mapping[int, Row]) -> SampleBatch:
         """What is left of it."""
         left = [k for k, number in enumerate(self.places) if number not in done]
-        parts = (tuple(part[k] for k in left) for part in (self.places, self.values, self.confirm))
-        return SampleBatch(*parts, self.tries)  # type: ignore[arg-type]
+        return SampleBatch(
+            tuple(self.places[k] for k in left),
+            tuple(self.values[k] for k in left),
+            tuple(self.confirm[k] for k in left),
+            self.tries,
+        )
 
 
 def program() -> str:

@@ -357,9 +357,9 @@ def simulate(
             changed=changed,
         )
     except AnalysisError as error:
-        part = getattr(error, "trajectory", None)
+        part = error.trajectory
         if part is not None:
-            error.trajectory = told(part)  # type: ignore[attr-defined]
+            error.trajectory = told(part)
         if beyond:
             error.args = (f"{error}; {beyond}",)
         raise

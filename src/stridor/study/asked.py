@@ -81,7 +81,7 @@ def names_of(given: str | Iterable[str], where: str) -> tuple[str, ...]:
     try:
         names: tuple[Any, ...] = tuple(given)
     except TypeError:
-        names = (None,)
+        names = ()
     if not names or not all(isinstance(name, str) for name in names):
         raise CaseError(where, given, "a name, or a list of names")
     return names

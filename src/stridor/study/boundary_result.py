@@ -171,7 +171,7 @@ class Boundary(Tabular):
         is not between three counted points that say different numbers: there growing modes pass the highest frequency,
         or two that diverge meet and flutter."""
         grid = np.stack(np.meshgrid(*(np.asarray(v, dtype=float) for v in (xs, ys)), indexing="ij"), axis=-1)
-        grid = np.clip((grid - self._low) / self._width, BESIDE, 1 - BESIDE)
+        grid = np.clip((grid - self._low) / self._width, BESIDE, 1 - BESIDE)  # ty: ignore[unsupported-operator]
         table, known = self._by_curves(grid), np.ones(grid.shape[:2], dtype=bool)
         # Curves that end within the rectangle make what they say depend on the way: here it is the same for both.
         more = self._counts - [self._up_to(p) for p in self._places]

@@ -80,7 +80,7 @@ def _report_at(case: Case, name: str, body: MatrixBody, mu: float) -> BodyReport
 
 def _held(case: Case, body: str) -> list[str]:
     """Names of supports, springs and ties of the case at a body."""
-    ends = {f"supports.{key}": (support.at,) for key, support in case.supports.items()}
+    ends: dict[str, tuple[str, ...]] = {f"supports.{key}": (support.at,) for key, support in case.supports.items()}
     ends |= {f"springs.{key}": spring.between for key, spring in case.springs.items()}
     ends |= {f"ties.{key}": (tie.slave, tie.master) for key, tie in case.ties.items()}
     return [key for key, places in ends.items() if any(p != "ground" and case.location(p).body == body for p in places)]

@@ -34,7 +34,7 @@ class Sensitivities(Rates, Tabular):
     parameters: tuple[str, ...]
     values: Array
     branch: IntArray
-    eigenvalues: ComplexArray
+    eigenvalues: ComplexArray  # ty: ignore[incompatible-attribute-override]
     derivative: ComplexArray
     condition: Array
     nearest: Array

@@ -255,7 +255,7 @@ class Unsaved(Workspace):
     long as some of them."""
 
     @property
-    def text(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+    def text(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]  # ty: ignore[incompatible-property-override]
         """Nothing."""
         return ""
 

@@ -122,7 +122,7 @@ class System(Shown):
     stiffness: Sparse
     contacts: tuple[Contact, ...] = ()
     loads: Mapping[str, Array] = field(default_factory=dict)
-    motion: PrescribedMotion = None  # type: ignore[assignment]  # filled in __post_init__
+    motion: PrescribedMotion = None  # type: ignore[assignment]  # ty: ignore[invalid-assignment]  # filled in __post_init__
     points: Mapping[str, Rows] = field(default_factory=dict)
     lines: tuple[Line, ...] = ()
     dof_names: tuple[str, ...] = ()

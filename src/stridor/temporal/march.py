@@ -110,7 +110,7 @@ class March:
         try:
             stepper.advance(size, self.schedule, stretch.name)
         except AnalysisError as error:
-            error.trajectory = self._trajectory(interrupted=True)  # type: ignore[attr-defined]
+            error.trajectory = self._trajectory(interrupted=True)
             raise
         self.within = False
         return stepper.done - done

@@ -112,7 +112,7 @@ class _Panel(Panel):
         if not all(self.axes) or not all(isinstance(v, int | float) and math.isfinite(v) for v in values):
             return
         known = {FRICTION, *(lever.path for lever in self.session.levers())}
-        numbers = {path: float(value) for path, value in zip(self.axes, values, strict=True) if path in known}  # type: ignore[arg-type]
+        numbers = {path: float(value) for path, value in zip(self.axes, values, strict=True) if path in known}  # type: ignore[arg-type]  # ty: ignore[invalid-argument-type]
         self.session.put(numbers, moving="map" if given.get("held") else None)
 
     def _sample(self, event: events.GenericEventArguments) -> None:

@@ -34,7 +34,7 @@ class Scales:
 def scales(family: HarmonicFamily, omega: float, mu: float, harmonics: int) -> Scales:
     """One over the receptances of each node by itself, in the mean of the harmonics."""
     s = 1j * omega * np.arange(1, harmonics + 1)
-    value = family.condensed(s)[0]
+    value = family.condensed(s)[0]  # ty: ignore[invalid-argument-type]
     own = np.abs(np.einsum("fii->fi", value))
     normal, _, _ = family.split(np.exp(np.log(np.maximum(own, 1e-300)).mean(axis=0)))
     _, along, _ = family.split(np.exp(np.log(np.maximum(own * np.abs(s)[:, None], 1e-300)).mean(axis=0)))
@@ -172,7 +172,7 @@ def evaluated(
 ) -> Evaluated:
     """The balance at z (r, l), ω [rad/s] and μ; drive (r,): what moves with the first harmonic whatever contacts do."""
     base = fourier(z.shape[1] // 2)
-    value, slope = family.condensed(1j * omega * np.arange(base.harmonics + 1))
+    value, slope = family.condensed(1j * omega * np.arange(base.harmonics + 1))  # ty: ignore[invalid-argument-type]
     moved = np.einsum("kij,kj->ki", value, base.complex_of(z))
     moved[0] += family.still
     if drive is not None:

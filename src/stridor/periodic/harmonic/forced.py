@@ -57,7 +57,7 @@ def forced(
         off = np.linalg.norm(at.left) / size
         raise AnalysisError(f"the forced balance ends {off:.2g} off; begin from another answer")
     s = 1j * omega * np.arange(harmonics + 1)
-    found = np.einsum("kij,kj->ki", modes.answers(s), at.base.complex_of(at.z))
+    found = np.einsum("kij,kj->ki", modes.answers(s), at.base.complex_of(at.z))  # ty: ignore[invalid-argument-type]
     found[0] += modes.load / modes.squares
     found[1] += alone
     return Response(at, found)

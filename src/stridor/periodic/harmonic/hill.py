@@ -198,7 +198,8 @@ def _toeplitz(cycle: Balanced) -> tuple[ComplexArray, ComplexArray, ComplexArray
     for q in range(family.springs):
         row = m * (1 + d) + q
         of_motion[:, row, :, row] = _spread(applied.by_stretch[q], (np.zeros(0, dtype=np.int64), np.zeros(0)), length)
-    return tuple(a.reshape(length * r, length * r) for a in (of_force, of_motion, of_speed))  # type: ignore[return-value]
+    square = (length * r, length * r)
+    return of_force.reshape(square), of_motion.reshape(square), of_speed.reshape(square)
 
 
 def _edges(touch: Array, beyond: Array) -> tuple[IntArray, Array]:

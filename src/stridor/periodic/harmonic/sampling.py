@@ -137,7 +137,7 @@ def coordinates(cycle: Balanced) -> ComplexArray:
     """Amplitudes (h + 1, k) of the modes' coordinates."""
     at, modes = cycle.at, cycle.family.condensed
     s = 1j * at.omega * np.arange(at.base.harmonics + 1)
-    found = np.einsum("kij,kj->ki", modes.answers(s), at.base.complex_of(at.z))
+    found = np.einsum("kij,kj->ki", modes.answers(s), at.base.complex_of(at.z))  # ty: ignore[invalid-argument-type]
     found[0] += modes.load / modes.squares
     return found
 
