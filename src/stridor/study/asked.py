@@ -74,14 +74,13 @@ def require_choice(given: Any, where: str, accepted: Iterable[str | bool | None]
         raise CaseError(where, given, f"one of {', '.join(str(word) for word in words)}")
 
 
-def names_of(given: str | Iterable[str], where: str) -> tuple[str, ...]:
-    """Names as a list of them; one may stand by itself. Raises CaseError for anything else, and for none."""
+def names_of(given: str | Iterable[str], where: str, *, none: bool = False) -> tuple[str, ...]:
+    """Names as a list of them; one may stand by itself, and there may be ``none``. Raises CaseError for anything
+    else."""
     if isinstance(given, str):
         return (given,)
-    try:
-        names: tuple[Any, ...] = tuple(given)
-    except TypeError:
-        names = ()
-    if not names or not all(isinstance(name, str) for name in names):
+    listed: Any = given
+    names: tuple[Any, ...] = tuple(listed) if isinstance(listed, Iterable) else (None,)
+    if not (names or none) or not all(isinstance(name, str) for name in names):
         raise CaseError(where, given, "a name, or a list of names")
     return names

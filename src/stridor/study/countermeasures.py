@@ -96,7 +96,7 @@ def rank_countermeasures(
         columns = linear.modes.branch[ranking.columns]
         return Countermeasures(linear.mu, target, columns, ranking.eigenvalues, (), margin, told, source)
     left = whole_matrices(case, linear.mu) if numbers is None else []
-    found = ranking.numbers(default_numbers(case, left) if numbers is None else names_of(numbers, "numbers"))
+    found = ranking.numbers(default_numbers(case, left) if numbers is None else names_of(numbers, "numbers", none=True))
     if added_mass:
         found += ranking.masses()
     if chamfers > 0:

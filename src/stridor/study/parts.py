@@ -63,9 +63,7 @@ def chosen_parts(
 
 def _names(given: str | Collection[str] | None, where: str) -> set[str]:
     """Names as given, several with commas in one. Raises CaseError."""
-    if given is None or (isinstance(given, list | tuple | set | frozenset) and not given):
-        return set()
-    names = [name.strip() for text in names_of(given, where) for name in text.split(",")]
+    names = [name.strip() for text in names_of(() if given is None else given, where, none=True) for name in text.split(",")]
     for name in names:
         if name not in (*PARTS, *OF_COMPARISON):
             accepted = f"{', '.join(PARTS)}; of the comparison {', '.join(OF_COMPARISON)}"
