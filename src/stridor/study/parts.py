@@ -63,7 +63,8 @@ def chosen_parts(
 
 def _names(given: str | Collection[str] | None, where: str) -> set[str]:
     """Names as given, several with commas in one. Raises CaseError."""
-    names = [name.strip() for text in names_of(() if given is None else given, where, none=True) for name in text.split(",")]
+    texts = names_of(() if given is None else given, where, none=True)
+    names = [name.strip() for text in texts for name in text.split(",")]
     for name in names:
         if name not in (*PARTS, *OF_COMPARISON):
             accepted = f"{', '.join(PARTS)}; of the comparison {', '.join(OF_COMPARISON)}"
