@@ -342,6 +342,7 @@ def test_real_matrices_go_through_complex_factors_two_columns_at_a_time(monkeypa
 
 # -- one program -------------------------------------------------------------------------------------------------------
 @needs_mpi
+@pytest.mark.slow
 def test_an_error_of_the_case_is_said_once_and_ends_all(bench: Path):
     for words, said in (
         (["nowhere.toml"], "stridor: nowhere.toml: no such file"),

@@ -653,7 +653,7 @@ def test_what_grows_at_the_low_end_has_its_critical_friction_there(tmp_path: Pat
         found.indices()  # of a number that does not vary
 
 
-@pytest.mark.parametrize("compute", ["steady", "simulate", "compare"])
+@pytest.mark.parametrize("compute", ["steady", "simulate", pytest.param("compare", marks=pytest.mark.slow)])
 def test_other_analyses_have_rows_too(case: st.Case, tmp_path: Path, compute: str) -> None:
     short = case.with_({"phases": [{"name": "go", "duration": 2e-4}], "comparison.critical": False, "temporal.record_every": 1})
     study = st.Study(case=short, compute=compute, parameters={"mu": {"values": (0.1, 0.3)}})
