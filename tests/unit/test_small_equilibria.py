@@ -11,6 +11,7 @@ import scipy.sparse as sp
 
 from stridor.direct import SingularMatrix
 from stridor.direct.dense import solved
+from stridor.errors import CaseError
 from stridor.sliding import small
 from stridor.sliding.equilibrium import ContactRows, Equilibrium
 from stridor.system.model import AnswerCache, CubicSprings, Rows
@@ -69,6 +70,17 @@ def test_both_ways_meet_and_only_many_unknowns_are_factorised(monkeypatch: pytes
     assert other.system.of_matrices.known("factors nearby") is not None
     assert few.displacement == pytest.approx(many.displacement, rel=1e-11)
     assert few.normal_force == pytest.approx(many.normal_force, rel=1e-10)
+
+
+def test_a_solver_that_is_none_is_refused_also_where_none_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
+    equilibrium, active = problem(2)
+    equilibrium.solver = "nonsense"
+    with pytest.raises(CaseError, match=r"^solver: 'nonsense' – no such solver"):
+        equilibrium.solve(active)
+    other, _ = problem(2)
+    monkeypatch.setenv("STRIDOR_SOLVER", "nonsense")
+    with pytest.raises(CaseError, match=r"^environment variable STRIDOR_SOLVER: 'nonsense'"):
+        other.solve(active)
 
 
 @pytest.mark.parametrize("most", [small.SMALL, -1])

@@ -10,9 +10,9 @@ import numpy as np
 import scipy.linalg as sl
 
 from ..typing import Array, ComplexArray, IntArray
+from .factor import BACKWARD_ERROR
 
 REGULAR = 1e-11  # reciprocal condition, after equilibration, from which on a matrix is clearly regular
-SOLVED = 1e-14  # componentwise backward error of an answer to full precision
 
 
 def lu_factors(matrix: Any, *, check_finite: bool = True) -> tuple[Any, Any]:
@@ -40,7 +40,7 @@ def solved(matrix: Array, right: Array) -> Array | None:
         answer: Array = solution[:, 0]
         # LAPACK's own bound is one where an unknown that nothing asks for is zero.
         terms = np.abs(matrix) @ np.abs(answer) + np.abs(right)
-        return answer if np.all(np.abs(right - matrix @ answer) <= SOLVED * terms) else None
+        return answer if np.all(np.abs(right - matrix @ answer) <= BACKWARD_ERROR * terms) else None
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ import scipy.sparse as sp
 
 from .. import direct
 from ..contact.nodes import ContactNodes
+from ..direct.backends import choose
 from ..errors import AnalysisError
 from ..system import System
 from ..typing import Array, BoolArray, IntArray, Sparse
@@ -92,6 +93,9 @@ class Equilibrium:
 
     @cached_property
     def _small(self) -> Small | None:
+        # The solver asked for must be one where it is not needed, too; SLEPc's processes take part in all that it does.
+        if choose(self.solver) == "slepc":
+            return None
         return Small.of(self.system, self.nodes.normal, self.push)
 
     @property
