@@ -343,13 +343,13 @@ def test_sharp_edges_sketch_a_box():
 def test_twenty_thousand_facets_are_drawn_in_time_and_stay_small():
     system = made([boxes((70, 70, 35), (1.0, 1.0, 0.2))], 3)
     vector = np.sin(np.arange(system.size) * 0.01)
-    begin = time.perf_counter()
+    begin = time.process_time()
     skin = skin_of(system, vector)
     assert len(skin.facets) == 2 * 4900 + 4 * 2450
     figure = solid_plots.draw_frame(skin, phase=0.0, scale=None, view=(28.0, -58.0), title="")
     held = io.BytesIO()
     figure.savefig(held, format="svg")
-    assert time.perf_counter() - begin < 10.0
+    assert time.process_time() - begin < 10.0
     assert held.tell() < 2e6
     assert len(animation_html(system, vector, frequency_hz=1.0)) < 1.3e6
 
