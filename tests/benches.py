@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, field
 
@@ -191,6 +192,37 @@ def growing(values: np.ndarray, tolerance: float = 1e-7) -> np.ndarray:
 def distance_to(found: np.ndarray, reference: np.ndarray) -> np.ndarray:
     """Relative distance of each found eigenvalue to the nearest of the reference."""
     return np.abs(found[:, None] - reference).min(axis=1) / np.maximum(np.abs(found), 1.0)
+
+
+def equilibria_by_hand(system: System, mu: float | None = None) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Displacement (n,), normal forces (m,) and who touches (m,) of every set of contacts that is in equilibrium: N ≥ 0
+    on it and no gap below zero elsewhere; contacts kept closed touch, and where they pull friction is μ|N| as well.
+    Dense, set by set and sign by sign."""
+    n, m, right = system.size, len(system.contacts), []
+    stiffness = system.stiffness.toarray()
+    scale = np.abs(stiffness).max()
+    motion = np.ones(len(system.motion.names))
+    force = sum(system.loads.values()) - system.motion.damping @ motion
+    slip = np.array([c.tangent_lift @ motion for c in system.contacts])
+    friction = np.array([c.law.sliding(abs(v)) for c, v in zip(system.contacts, slip, strict=True)])
+    friction = friction if mu is None else np.full(m, mu)
+    normal, tangent = (np.array([getattr(c, key) for c in system.contacts]) for key in ("normal_row", "tangent_row"))
+    gap, soft, kept = (np.array([getattr(c, key) for c in system.contacts]) for key in ("gap", "compliance", "closed"))
+    # Of each contact: open, pushing, or pulling; of those kept closed the last two.
+    for kinds in itertools.product(*((1, -1) if k else (0, 1) for k in kept)):
+        on, sign = np.array(kinds) != 0, np.where(np.array(kinds) < 0, -1.0, 1.0)
+        push = normal - (sign * friction * np.sign(slip))[:, None] * tangent
+        whole = np.block([[stiffness, -scale * push[on].T], [scale * normal[on], np.diag(soft[on] * scale * scale)]])
+        try:
+            answer = np.linalg.solve(whole, np.concatenate([force, -scale * gap[on]]))
+        except np.linalg.LinAlgError:
+            continue
+        forces = np.zeros(m)
+        forces[on] = answer[n:] * scale
+        gaps = (gap + normal @ answer[:n])[~on]
+        if np.abs(answer[:n]).max() < 1e6 and (sign * forces >= 0).all() and (gaps >= 0).all():
+            right.append((answer[:n], forces, on))
+    return right
 
 
 def touching(system: System, mu: float) -> np.ndarray:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from stridor.sliding import points, stretches, surfaces
+from stridor.sliding import solution, stretches
 from stridor.system import build, uncoupled
 
 
@@ -35,18 +35,16 @@ class Counts:
 
         self.built = count(monkeypatch, build.build_system)
         self.bases = count(monkeypatch, uncoupled._solved)
-        self.points = count(monkeypatch, points.steady_sliding)
-        self.nodes = count(monkeypatch, surfaces.steady_sliding_nodes)
-        assert stretches.steady_sliding_nodes is surfaces.steady_sliding_nodes
+        self.nodes = count(monkeypatch, solution.steady_sliding)
+        assert stretches.steady_sliding is solution.steady_sliding
 
     def check(self) -> None:
         """Assert that nothing was computed twice: one system, one basis with and one without damping, and no
         equilibrium of one system at one μ again."""
         assert len(self.built) == 1
         assert len(self.bases) <= 2
-        for calls in (self.points, self.nodes):
-            asked = [_question(call) for call in calls if not _of_a_phase(call)]
-            assert len(asked) == len(set(asked))
+        asked = [_question(call) for call in self.nodes if not _of_a_phase(call)]
+        assert len(asked) == len(set(asked))
         assert self.nodes
 
 

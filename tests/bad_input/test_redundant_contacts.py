@@ -7,7 +7,7 @@ import pytest
 import stridor as st
 from stridor.case import Case, loads, template_text
 from stridor.errors import AnalysisError, CaseError
-from stridor.sliding import surfaces
+from stridor.sliding import solution
 
 MASS = """
 [bodies.m]
@@ -120,10 +120,10 @@ def test_supports_that_take_the_freedoms_are_named() -> None:
 def test_they_are_named_where_rounding_keeps_the_touching_nodes_from_settling(monkeypatch: pytest.MonkeyPatch) -> None:
     """What a solver makes of a singular matrix is rounding, which differs between libraries."""
 
-    def unsettled(*_: object) -> None:
+    def unsettled(*_: object, **__: object) -> None:
         raise AnalysisError("steady sliding: the set of touching nodes does not settle")
 
-    monkeypatch.setattr(surfaces, "find_touching", unsettled)
+    monkeypatch.setattr(solution, "find_touching", unsettled)
     for normals, said in (([(0.0, 1.0)] * 2, TWICE), ([(0.0, 1.0)], "steady sliding: the set of touching nodes")):
         with pytest.raises(AnalysisError, match=f"^{said}"):
             st.steady_sliding(loads(flats(*normals)))

@@ -12,7 +12,7 @@ from solid_cases import slider
 from stridor.case import loads
 from stridor.errors import AnalysisError
 from stridor.sliding import equilibrium, prepared
-from stridor.sliding.surfaces import SurfaceSliding, steady_sliding_nodes
+from stridor.sliding.solution import SteadySliding, steady_sliding
 from stridor.system import System, build_system
 from stridor.typing import BoolArray
 
@@ -52,19 +52,19 @@ def random_system(seed: int, *, closed: bool = False, held: bool = True, skewed:
     return System.from_matrices(np.eye(n), None, stiffness, contacts=contacts, loads={"push": 10.0 * push})
 
 
-def alone(system: System, mu: float, monkeypatch: pytest.MonkeyPatch) -> SurfaceSliding:
+def alone(system: System, mu: float, monkeypatch: pytest.MonkeyPatch) -> SteadySliding:
     with monkeypatch.context() as patch:
         patch.setattr(equilibrium.Equilibrium, "_by_prepared", lambda self, active: None)
-        return steady_sliding_nodes(system, mu=mu)
+        return steady_sliding(system, mu=mu)
 
 
 def together(
     system: System, mu: float, monkeypatch: pytest.MonkeyPatch, held: BoolArray | None = None
-) -> SurfaceSliding:
+) -> SteadySliding:
     """By prepared factors, or not at all."""
     with monkeypatch.context() as patch:
         patch.setattr(equilibrium.Equilibrium, "_linear", None)
-        return steady_sliding_nodes(system, mu=mu, held=held)
+        return steady_sliding(system, mu=mu, held=held)
 
 
 def prepared_of(system: System) -> prepared.Prepared | None:
@@ -72,7 +72,7 @@ def prepared_of(system: System) -> prepared.Prepared | None:
     return preparing.prepared
 
 
-def assert_same(found: SurfaceSliding, own: SurfaceSliding) -> None:
+def assert_same(found: SteadySliding, own: SteadySliding) -> None:
     np.testing.assert_array_equal(found.active, own.active)
     np.testing.assert_array_equal(found.sense, own.sense)
     for name in ("normal_force", "friction_force", "displacement", "gap"):
@@ -104,7 +104,7 @@ def test_sets_that_are_given_whatever_the_signs(monkeypatch: pytest.MonkeyPatch)
         held = np.random.default_rng(k).random(MANY) < 0.6
         with monkeypatch.context() as patch:
             patch.setattr(equilibrium.Equilibrium, "_by_prepared", lambda self, active: None)
-            own = steady_sliding_nodes(system, mu=0.4, held=held)
+            own = steady_sliding(system, mu=0.4, held=held)
         found = together(system, 0.4, monkeypatch, held)
         np.testing.assert_allclose(found.normal_force, own.normal_force, atol=1e-11 * np.abs(own.normal_force).max())
         pulls += bool(np.any(own.normal_force < 0.0))
@@ -120,24 +120,24 @@ def test_what_contacts_do_not_hold_is_solved_by_itself() -> None:
     )  # fmt: skip
     for _ in range(3):
         with pytest.raises(AnalysisError, match="can move freely"):
-            steady_sliding_nodes(system, mu=0.3)
+            steady_sliding(system, mu=0.3)
     assert prepared_of(system) is None
 
 
 @pytest.mark.parametrize("wrong", ["by_normal", "by_tangent"])
 def test_an_answer_that_does_not_balance_is_not_taken(wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
     system = random_system(2)
-    steady_sliding_nodes(system, mu=0.2)
+    steady_sliding(system, mu=0.2)
     known = prepared_of(system)
     assert known is not None
     getattr(known, wrong)[...] *= -3.0
     own = alone(system, 0.5, monkeypatch)
-    assert_same(steady_sliding_nodes(system, mu=0.5), own)
+    assert_same(steady_sliding(system, mu=0.5), own)
 
 
 def test_what_takes_too_much_memory_or_other_nodes(monkeypatch: pytest.MonkeyPatch) -> None:
     system = random_system(4)
-    steady_sliding_nodes(system, mu=0.2)
+    steady_sliding(system, mu=0.2)
     first = prepared_of(system)
     assert first is not None
     others = replace(system, contacts=system.contacts[:-1])
@@ -148,7 +148,7 @@ def test_what_takes_too_much_memory_or_other_nodes(monkeypatch: pytest.MonkeyPat
     assert second is not first
     monkeypatch.setattr(prepared, "LARGEST", 0.0)
     large = random_system(4)
-    assert_same(steady_sliding_nodes(large, mu=0.2), alone(large, 0.2, monkeypatch))
+    assert_same(steady_sliding(large, mu=0.2), alone(large, 0.2, monkeypatch))
     assert prepared_of(large) is None
 
 
@@ -168,5 +168,5 @@ def test_where_nothing_touches_nothing_is_prepared(monkeypatch: pytest.MonkeyPat
         contacts={"c0": {"normal": {0: 1.0}, "tangent": {1: 1.0}, "gap": 1e3, "friction": RUBS, "stiffness": "rigid"}},
     )  # fmt: skip
     with pytest.raises(AnalysisError, match="no contact"):
-        steady_sliding_nodes(apart, mu=0.3)
+        steady_sliding(apart, mu=0.3)
     assert prepared_of(apart) is None

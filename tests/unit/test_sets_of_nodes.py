@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ import scipy.sparse as sp
 import stridor as st
 from stridor.app.pictures import steady_document
 from stridor.contact.multipliers import OPEN, SLIP, STICK
+from stridor.direct import SingularMatrix
 from stridor.errors import AnalysisError
-from stridor.sliding import history, points, surfaces
+from stridor.sliding import equilibrium, history, solution
 from stridor.sliding.equilibrium import NEWTON_STEPS, ContactRows, Equilibrium, NodeEquilibrium, changed, find_touching
 from stridor.sliding.redundant import closed, redundant
 from stridor.sliding.stick_slip import Frictional, Loading, StickSlip, _Change, increments_of
@@ -171,78 +173,88 @@ def test_increments_share_the_way_from_step_to_step() -> None:
 # -- bounds ------------------------------------------------------------------------------------------------------------
 
 
-def contact(name: str) -> SimpleNamespace:
-    return SimpleNamespace(name=name, closed=False, gap=0.0, normal_row=np.ones(1), compliance=1.0)
+def rigid(stiffness, force, normal, push, gap) -> Equilibrium:
+    """The equations of a small structure on rigid contacts."""
+    n, m = len(force), len(gap)
+    system: Any = SimpleNamespace(
+        of_matrices=AnswerCache(), stiffness=sp.csr_array(stiffness), cubic=None, size=n, symmetric_definite=True
+    )
+    rows = ContactRows(sp.csr_array(normal), gap, np.zeros(m), np.zeros(m), np.zeros(m, dtype=bool))
+    return Equilibrium(system, rows, sp.csr_array(push), force, symmetric=False, solver=None)
 
 
-@pytest.mark.parametrize(("tries", "settles"), [(9, True), (10, True), (11, True), (13, True), (15, False)])
-def test_points_are_given_four_tries_each_and_two_more_and_then_all_sets(monkeypatch, tries: int, settles: bool) -> None:
-    # Two contacts of which the first pulls again and again, and is found closing by its gap in between.
-    asked = 0
-
-    def solve(system, force, mu, sense, active):
-        nonlocal asked
-        asked += 1
-        again = asked < tries
-        normal = np.where(active, 1.0, 0.0)
-        if again and active[0]:
-            normal[0] = -1.0
-        return np.array([-1.0 if again and not active[0] else 0.0]), normal, 0.0
-
-    monkeypatch.setattr(points, "_solve", solve)
-    monkeypatch.setattr(points, "_twice", lambda system, active: "")
-    system = SimpleNamespace(contacts=[contact("A"), contact("B")], size=1)
-    given = (system, np.zeros(1), np.full(2, 0.3), np.ones(2), np.ones(2))
-    if settles:
-        points._active_set(*given)
-        assert asked == tries
-    else:
-        said = r"^steady sliding at μ = 0.3: none of the 4 sets of touching nodes is in equilibrium and holds the structure; turn loads"
-        with pytest.raises(AnalysisError, match=said):
-            points._active_set(*given)
-        assert asked == 4 * 2 + 2 + 4
+def by_all_sets(stiffness, force, normal, push, gap) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Every set of touching nodes that is in equilibrium, and its forces."""
+    right, n, m = [], len(force), len(gap)
+    for bits in range(2**m):
+        on = np.array([bool(bits >> k & 1) for k in range(m)])
+        count = int(on.sum())
+        whole = np.block([[stiffness, -push[on].T], [normal[on], np.zeros((count, count))]])
+        if np.linalg.cond(whole) > 1e12:
+            continue
+        answer = np.linalg.solve(whole, np.concatenate([force, -gap[on]]))
+        if (answer[n:] >= 0).all() and (gap + normal @ answer[:n])[~on].min(initial=0.0) >= 0:
+            right.append((on, answer[n:]))
+    return right
 
 
-def test_with_much_friction_the_equilibrium_is_that_of_some_set(monkeypatch) -> None:
-    # Three rigid contacts on six freedoms: all eight sets by NumPy tell whether there is one.
-    rng, gone_round = np.random.default_rng(7), 0
-    tried = points.sets_near
+def settled(equations: Equilibrium) -> tuple[Equilibrium, NodeEquilibrium, int]:
+    nodes: Any = SimpleNamespace(count=equations.nodes.count, kept=equations.nodes.kept, compliance=equations.nodes.compliance)
+    return solution._settled(lambda sign: equations, nodes, np.ones(nodes.count), None, None)
+
+
+@pytest.mark.parametrize("singular", [False, True])
+def test_with_much_friction_the_equilibrium_is_that_of_some_set(monkeypatch, singular: bool) -> None:
+    # Three rigid contacts on six freedoms: all eight sets by NumPy tell whether there is one. singular: friction is such
+    # that all three together have no equilibrium.
+    rng, gone_round, found_none = np.random.default_rng(7), 0, 0
+    tried = equilibrium.sets_near
 
     def counted(*given):
         nonlocal gone_round
         gone_round += 1
         return tried(*given)
 
-    monkeypatch.setattr(points, "sets_near", counted)
-    monkeypatch.setattr(points, "_twice", lambda system, active: "")
-    for _ in range(150):
+    monkeypatch.setattr(equilibrium, "sets_near", counted)
+    for _ in range(40 if singular else 150):
         half = rng.normal(size=(6, 6))
         stiffness, force, mu = half @ half.T + 0.1 * np.eye(6), 3 * rng.normal(size=6), np.full(3, rng.uniform(0.5, 3.0))
-        rows, tangents, gaps = rng.normal(size=(3, 6)), rng.normal(size=(3, 6)), rng.uniform(0, 0.2, 3)
-        right = []
-        for bits in range(8):
-            on = np.array([bool(bits >> k & 1) for k in range(3)])
-            push = (rows + mu[:, None] * tangents)[on]
-            count = int(on.sum())
-            whole = np.block([[stiffness, -push.T], [rows[on], np.zeros((count, count))]])
-            answer = np.linalg.solve(whole, np.concatenate([force, -gaps[on]]))
-            if (answer[6:] >= 0).all() and (gaps + rows @ answer[:6])[~on].min(initial=0.0) >= 0:
-                right.append((on, answer[6:]))
-        parts = [
-            SimpleNamespace(name="ABC"[k], closed=False, gap=gaps[k], normal_row=rows[k], tangent_row=tangents[k], compliance=0.0)
-            for k in range(3)
-        ]  # fmt: skip
-        system = SimpleNamespace(contacts=parts, size=6, stiffness=sp.csr_array(stiffness), lines=())
-        given = (system, force, mu, np.ones(3))
-        if right:
-            found = points._settled(*given)
+        normal, tangent, gap = rng.normal(size=(3, 6)), rng.normal(size=(3, 6)), rng.uniform(0, 0.2, 3)
+        push = normal + mu[:, None] * tangent
+        if singular:  # the force of the third opens none of the contacts by itself
+            within = np.linalg.solve(stiffness, normal.T)
+            push[2] -= normal.T @ np.linalg.solve(normal @ within, within.T @ push[2])
+        given = stiffness, force, normal, push, gap
+        if right := by_all_sets(*given):
+            _, found, _ = settled(rigid(*given))
             same = [on for on, _ in right if np.array_equal(on, found.active)]
             assert len(same) == 1
-            assert found.normal[found.active] == pytest.approx(next(n for on, n in right if on is same[0]), rel=1e-6)
+            force_of = next(n for on, n in right if on is same[0])
+            assert found.normal_force[found.active] == pytest.approx(force_of, rel=1e-6)
         else:
-            with pytest.raises(AnalysisError, match="none of the 8 sets of touching nodes is in equilibrium"):
-                points._settled(*given)
+            found_none += 1
+            said = None if singular else "^steady sliding at μ = 1: none of the 8 sets of touching nodes is in equilibrium"
+            with pytest.raises(SingularMatrix if singular else AnalysisError, match=said):
+                settled(rigid(*given))
     assert gone_round > 8
+    assert found_none < 75
+
+
+def test_a_large_structure_that_nothing_holds_is_not_asked_for_every_set(monkeypatch) -> None:
+    asked = 0
+
+    def solve(active, start=None):
+        nonlocal asked
+        asked += 1
+        raise SingularMatrix("no pivot")
+
+    given = rigid(np.eye(3), np.zeros(3), np.eye(3)[:2], np.eye(3)[:2], np.zeros(2))
+    monkeypatch.setattr(given, "solve", solve)
+    for size, tries in ((solution.MOST // 4, 5), (solution.MOST // 4 + 1, 1)):
+        given.force, asked = np.zeros(size), 0
+        with pytest.raises(SingularMatrix, match="no pivot"):
+            settled(given)
+        assert asked == tries
 
 
 @pytest.mark.parametrize(("size", "held"), [(2.9e6, True), (3.1e6, False)])
@@ -250,15 +262,15 @@ def test_a_body_that_moves_a_million_times_its_size_is_loose(monkeypatch, size: 
     # A bar of 3 m far from the origin: its extent counts, not where it is.
     bar = SimpleNamespace(points=np.array([[50.0, 10.0], [53.0, 10.5]]))
     system = SimpleNamespace(lines=(), solids=(bar,))
-    monkeypatch.setattr(surfaces, "_loose", lambda *given: "it is loose")
+    monkeypatch.setattr(solution, "_loose", lambda *given: "it is loose")
     state = NodeEquilibrium(np.zeros(0, dtype=bool), np.array([0.0, -size]), np.zeros(0), np.zeros(0))
     if held:
-        surfaces._require_held(system, None, state, 1e-9)
+        solution._require_held(system, None, state, 1e-9)
         with pytest.raises(AnalysisError, match="it is loose"):
-            surfaces._require_held(system, None, state, 2e-8)
+            solution._require_held(system, None, state, 2e-8)
     else:
         with pytest.raises(AnalysisError, match="it is loose"):
-            surfaces._require_held(system, None, state, 1e-9)
+            solution._require_held(system, None, state, 1e-9)
 
 
 def hardening(cubic: tuple[float, ...], *, gap=(0.0, 0.0), load: float = 1.0) -> Equilibrium:
@@ -336,7 +348,7 @@ def test_a_node_within_rounding_of_the_surface_touches(size: float) -> None:
 # -- what moves --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("named", [history._moved, lambda system, motion: surfaces._moved_most(system, np.abs(motion[:4]))])
+@pytest.mark.parametrize("named", [history._moved, lambda system, motion: solution._moved_most(system, np.abs(motion[:4]))])
 def test_what_moves_most_is_named(named) -> None:
     system = SimpleNamespace(
         size=4, lines=(SimpleNamespace(name="beam", freedoms=np.array([0])),),

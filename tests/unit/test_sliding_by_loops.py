@@ -12,18 +12,19 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from benches import by_hand
 from stridor.contact.multipliers import OPEN, SLIP, STICK
 from stridor.contact.nodes import ContactNodes
 from stridor.direct import SingularMatrix
-from stridor.errors import AnalysisError
+from stridor.errors import AnalysisError, NotSlidingError
 from stridor.laws import Coulomb, Weakening
-from stridor.sliding import equilibrium, points, pressing, stretches, surfaces
+from stridor.sliding import equilibrium, motions, pressing, solution, stretches
 from stridor.sliding.equilibrium import NodeEquilibrium, find_touching, offenders
 from stridor.sliding.redundant import redundant
 from stridor.sliding.resultants import balance, resultants
+from stridor.sliding.solution import SteadySliding
 from stridor.sliding.stick_slip import Frictional, Loading, StickSlip
 from stridor.sliding.stretches import Stretch, _different, _Equilibria, _Look, _probes
-from stridor.sliding.surfaces import SurfaceSliding
 from stridor.system.model import AnswerCache
 
 # What NumPy warns of is a fault here, whatever comes of it.
@@ -358,30 +359,6 @@ def test_equilibria_are_those_that_trying_all_sets_finds(stiff: float, size: flo
             assert state.gap == pytest.approx(open_by, abs=1e-9 * np.abs(u).max())
             assert solver.residual(state) < 1e-12
             assert steps < 12
-        contacts = [
-            SimpleNamespace(
-                name=f"c{k}", gap=gap[k], normal_row=normal[k], tangent_row=push[k] - normal[k], compliance=compliance[k],
-                closed=False,
-            )
-            for k in range(4)
-        ]  # fmt: skip
-        nodes = SimpleNamespace(normal=sp.csr_array(normal), owner=np.arange(4), names=tuple("abcd"))
-        system = SimpleNamespace(
-            contacts=contacts, lines=(), size=6, stiffness=sp.csr_array(stiffness), contact_nodes=lambda nodes=nodes: nodes,
-            holders={},
-        )  # fmt: skip
-        asked = system, force, np.full(4, 0.5), np.full(4, 2.0), np.ones(4)
-        if not forces.any():
-            with pytest.raises(AnalysisError, match="no contact carries load in steady sliding at μ = 0"):
-                points._active_set(*asked)
-            continue
-        try:
-            points_say = points._active_set(*asked)
-        except AnalysisError as error:  # it changes all that contradict at once, which need not end
-            assert "does not settle" in str(error)  # noqa: PT017
-            continue
-        assert points_say.displacement == pytest.approx(u, rel=1e-7, abs=1e-9 * np.abs(u).max())
-        assert points_say.normal_force == pytest.approx(forces, rel=1e-6, abs=1e-9 * size)
     assert tried > 6
 
 
@@ -454,7 +431,7 @@ def test_balance_is_the_work_left_in_rigid_motions(d: int, size: float, large: f
 # -- friction as damping -----------------------------------------------------------------------------------------------
 
 
-def rubbing(d: int, speeds, *, mu=None, kept: bool = False) -> tuple[Any, ContactNodes, SurfaceSliding]:
+def rubbing(d: int, speeds, *, mu=None, kept: bool = False) -> tuple[Any, ContactNodes, SteadySliding]:
     """Five nodes with freedoms of their own under laws that weaken, and that do not, sliding at given speeds."""
     rng = np.random.default_rng(14)
     m, t = len(speeds), d - 1
@@ -471,7 +448,7 @@ def rubbing(d: int, speeds, *, mu=None, kept: bool = False) -> tuple[Any, Contac
     sense /= np.linalg.norm(sense, axis=1, keepdims=True)
     force = rng.random(m) * (-1.0 if kept else 1.0)
     own = nodes.friction_coefficients(np.asarray(speeds))
-    steady = SurfaceSliding(
+    steady = SteadySliding(
         displacement=np.zeros(d * m), normal_force=force, friction_force=np.zeros((m, t)),
         slip_velocity=-sense * np.asarray(speeds)[:, None], sense=sense, active=np.ones(m, dtype=bool),
         friction_coefficient=own if mu is None else np.full(m, mu), gap=np.zeros(m), residual=0.0, iterations=1,
@@ -491,7 +468,7 @@ def test_friction_damps_along_the_slip_by_its_slope_and_across_it_by_its_turn(d:
     sense, active = steady.sense.copy(), steady.active.copy()
     sense[4], active[5] = 0.0, False
     steady = replace(steady, sense=sense, active=active)
-    found = surfaces.friction_damping_matrix(system, steady).toarray()
+    found = solution.friction_damping_matrix(system, steady).toarray()
     wanted = np.zeros_like(found)
     for i in range(4):
         law = nodes.laws[nodes.owner[i]]
@@ -509,12 +486,12 @@ def test_friction_damps_along_the_slip_by_its_slope_and_across_it_by_its_turn(d:
 
 def test_a_node_at_its_limit_that_no_motion_slides_does_not_damp() -> None:
     system, _, steady = rubbing(3, np.array([0.3, 0.7]))
-    whole = surfaces.friction_damping_matrix(system, steady).toarray()
+    whole = solution.friction_damping_matrix(system, steady).toarray()
     slip = steady.slip_velocity.copy()
     slip[1] = 0.0
     still = replace(steady, slip_velocity=slip)
     assert list(still.slips_still) == [False, True]
-    part = surfaces.friction_damping_matrix(system, still).toarray()
+    part = solution.friction_damping_matrix(system, still).toarray()
     assert part[:3, :3] == pytest.approx(whole[:3, :3])
     assert not part[3:].any()
     assert list(replace(still, status=np.array([SLIP, STICK])).slips_still) == [False, False]
@@ -528,7 +505,7 @@ def gap_changes(opening, slip) -> None:
     nodes: Any = SimpleNamespace(
         names=("first", "second"), owner=np.array([0, 1, 1]), normal_lift=np.array([[0.0], [opening], [opening / 2]])
     )
-    surfaces._require_constant_gap(nodes, np.array([-2.0]), np.array([5.0, slip, slip / 2]))
+    solution._require_constant_gap(nodes, np.array([-2.0]), np.array([5.0, slip, slip / 2]))
 
 
 def test_motions_that_change_a_gap_are_told_with_their_speed() -> None:
@@ -545,105 +522,84 @@ def test_a_contact_none_of_whose_nodes_slides_is_told_where_it_has_friction() ->
     mu = np.array([0.0, 0.0, 0.1, 0.0])
     slides = np.array([False, False, True, False])
     touching = np.ones(4, dtype=bool)
-    surfaces._require_slip(nodes, slides, mu, touching)
-    surfaces._require_slip(nodes, slides & False, mu, ~touching)
+    solution._require_slip(nodes, slides, mu, touching)
+    solution._require_slip(nodes, slides & False, mu, ~touching)
     for stands, friction, name in ((~slides, mu, "second"), (~slides & False, mu + 0.1, "first")):
         still = stands & np.array([True, True, False, False])
         with pytest.raises(AnalysisError, match=f"^contact {name} does not slide: no support moves one of its bodies along"):
-            surfaces._require_slip(nodes, still if name == "second" else still & False, friction, touching)
+            solution._require_slip(nodes, still if name == "second" else still & False, friction, touching)
 
 
 def test_friction_coefficients_in_words() -> None:
-    assert points.words_of_friction(np.array([0.3, 0.3 + 1e-9])) == "μ = 0.3"
-    assert points.words_of_friction(np.array([0.3, 0.1, 0.2])) == "μ = 0.1 … 0.3"
+    assert motions.words_of_friction(np.array([0.3, 0.3 + 1e-9])) == "μ = 0.3"
+    assert motions.words_of_friction(np.array([0.3, 0.1, 0.2])) == "μ = 0.1 … 0.3"
 
 
-@pytest.mark.parametrize(("size", "loose"), [(2.9e6, False), (3.1e6, True)])
-def test_beams_that_move_a_million_times_their_size_are_loose(size: float, loose: bool) -> None:
-    short = SimpleNamespace(coordinates=np.array([[7.0, 0.0], [8.0, 0.5]]))
-    line = SimpleNamespace(coordinates=np.array([[7.0, 50.0], [10.0, 50.5]]))
-    assert points._loose(np.array([0.0, -size]), SimpleNamespace(lines=(short, line))) is loose
-    assert points._loose(np.array([0.0, -size]), SimpleNamespace(lines=())) is False
-    assert points._loose(np.array([0.0, -1.01e12]), SimpleNamespace(lines=())) is True
-    assert points._loose(np.array([0.0, -0.99e12]), SimpleNamespace(lines=())) is False
-
-
-def points_on(speed: float, opening: float, *, mu: float = 0.2, monkeypatch) -> Any:
-    """Two point contacts of which the second slides and opens at these speeds at full motion."""
+def points_on(speed: float, opening: float, *, mu: float = 0.2) -> Any:
+    """Two bodies, each held by a spring of 2 N/m along x and pressed along y by 1 N and 4 N on a support that runs: the
+    first slides on it at 3 m/s, the second slides and opens at these speeds at full motion."""
+    normal, tangent = np.eye(4)[[1, 3]], np.eye(4)[[0, 2]]
+    loads = {"P": np.array([0.0, -1.0, 0.0, 0.0]), "Q": np.array([0.0, 0.0, 0.0, -4.0])}
+    laws = [Weakening(mu, 2 * mu, 1.0), Weakening(mu, 2 * mu, 1.0)]
+    system = by_hand(np.eye(4), np.zeros((4, 4)), 2.0 * np.eye(4), normal, tangent, math.inf, loads=loads, law=laws[0])
     lifts = [(np.array([3.0]), np.zeros(1)), (np.array([speed]), np.array([opening]))]
-    contacts = [SimpleNamespace(name=n, tangent_lift=t, normal_lift=o) for n, (t, o) in zip("ab", lifts, strict=True)]
-    system: Any = SimpleNamespace(
-        contacts=contacts, load_steps=(), loads={"P": np.array([1.0]), "Q": np.array([4.0])}, size=1,
-        motion=SimpleNamespace(full=np.ones(1), damping=np.array([[0.5]])),
-        friction_coefficients=lambda speeds: mu * (1 + speeds), contact_nodes=lambda: SimpleNamespace(share=np.ones(2)),
-    )  # fmt: skip
-    system.in_place = lambda: system
-    monkeypatch.setattr(points, "_active_set", lambda system, *given: given)
-    return system
+    contacts = [replace(c, tangent_lift=t, normal_lift=o) for c, (t, o) in zip(system.contacts, lifts, strict=True)]
+    motion = replace(system.motion, damping=np.array([[0.0], [0.5], [0.0], [0.0]]))
+    return replace(system, contacts=tuple(contacts), motion=motion)
 
 
-def test_points_slide_against_their_motion_under_their_loads(monkeypatch) -> None:
-    system = points_on(-0.5, 0.0, monkeypatch=monkeypatch)
-    force, mu, sense, speeds = points.steady_sliding(system)
-    assert (force.tolist(), speeds.tolist(), sense.tolist()) == ([4.5], [3.0, -0.5], [-1.0, 1.0])
-    assert mu == pytest.approx([0.8, 0.3])
-    force, mu, sense, speeds = points.steady_sliding(
-        system, mu=0.7, load_factors={"Q": 2.0, "P": 0.5}, motion_factors=np.array([-2.0])
+def test_points_slide_against_their_motion_under_their_loads() -> None:
+    system, weakens = points_on(-0.5, 0.0), lambda speed: 0.2 * (1 + math.exp(-speed))
+    found = solution.steady_sliding(system)
+    assert found.slip_velocity[:, 0].tolist() == [3.0, -0.5]
+    assert found.sense[:, 0].tolist() == [-1.0, 1.0]
+    assert found.normal_force == pytest.approx([1.5, 4.0])  # the damper pushes the first by 0.5 N
+    assert found.friction_coefficient == pytest.approx([weakens(3.0), weakens(0.5)])
+    assert found.displacement == pytest.approx([-1.5 * weakens(3.0) / 2, 0.0, 4.0 * weakens(0.5) / 2, 0.0], abs=1e-15)
+    found = solution.steady_sliding(
+        system, mu=0.7, load_factors={"Q": 2.0, "P": 0.5}, motion_factors=np.array([2.0])
     )
-    assert (force.tolist(), speeds.tolist(), sense.tolist()) == ([9.5], [-6.0, 1.0], [1.0, -1.0])
-    assert mu.tolist() == [0.7, 0.7]
-    assert points.steady_sliding(system, load_factors={})[0].tolist() == [4.5]
+    assert found.slip_velocity[:, 0].tolist() == [6.0, -1.0]
+    assert found.normal_force == pytest.approx([1.5, 8.0])
+    assert found.displacement == pytest.approx([-0.7 * 1.5 / 2, 0.0, 0.7 * 8.0 / 2, 0.0], abs=1e-15)
+    assert solution.steady_sliding(system, load_factors={}).normal_force == pytest.approx([1.5, 4.0])
+    back = solution.steady_sliding(system, mu=0.7, motion_factors=np.array([-1.0]))
+    assert back.sense[:, 0].tolist() == [1.0, -1.0]
+    assert back.displacement == pytest.approx([0.7 * 0.5 / 2, 0.0, -0.7 * 4.0 / 2, 0.0], abs=1e-15)
 
 
-def test_points_that_do_not_slide_or_whose_gap_changes_are_told(monkeypatch) -> None:
+def test_points_that_do_not_slide_or_whose_gap_changes_are_told() -> None:
     for speed, opening in ((0.5, 0.49e-9), (0.0, 0.9e-15), (1e-3, 0.9e-12)):
-        points.steady_sliding(points_on(speed, opening, monkeypatch=monkeypatch), mu=0.0)
-    for speed, opening, told in ((0.5, -0.51e-9, "-5.1e-10"), (0.0, 1.1e-15, "1.1e-15"), (1e-3, 1.1e-12, "1.1e-12")):
-        with pytest.raises(AnalysisError, match=f"^contact b: the prescribed velocities change its gap at {told} m/s, so"):
-            points.steady_sliding(points_on(speed, opening, monkeypatch=monkeypatch))
-    system, speeds, mu = points_on(0.0, 0.0, monkeypatch=monkeypatch), np.array([3.0, 0.0]), np.array([0.8, 0.2])
-    points.steady_sliding(system)
-    with pytest.raises(AnalysisError, match=r"^contact b does not slide: no support moves one of its bodies along"):
-        points._require_slip(system, speeds, mu, np.array([True, True]))
-    points._require_slip(system, speeds, mu, np.array([True, False]))
-    points._require_slip(system, speeds, 0.0 * mu, np.array([True, True]))
-    system.motion.full = np.zeros(1)  # nothing slides: said before anything is solved
-    with pytest.raises(AnalysisError, match=r"^contact a does not slide: no support moves one of its bodies along"):
-        points.steady_sliding(system)
+        solution.steady_sliding(points_on(speed, opening), mu=0.0)
+    for speed, opening, told in ((0.5, -0.51e-9, "5.1e-10"), (0.0, 1.1e-15, "1.1e-15"), (1e-3, 1.1e-12, "1.1e-12")):
+        with pytest.raises(AnalysisError, match=f"^contact C1: the prescribed velocities change its gap at {told} m/s, so"):
+            solution.steady_sliding(points_on(speed, opening))
+    system = points_on(0.0, 0.0)
+    with pytest.raises(AnalysisError, match=r"^contact C1 does not slide: no support moves one of its bodies along"):
+        solution.steady_sliding(system)
+    solution.steady_sliding(system, mu=0.0)
+    solution.steady_sliding(system, load_factors={"P": 1.0, "Q": 0.0})  # nothing presses there
+    # Nothing slides: said before anything is solved.
+    with pytest.raises(NotSlidingError, match=r"^contact C0 does not slide: no support moves one of its bodies along"):
+        solution.steady_sliding(system, motion_factors=np.zeros(1))
 
 
-@pytest.mark.parametrize(
-    ("stiffness", "active", "said"),
-    [
-        (1e-13, [True, True], ""),
-        (1e-13, [False, True], "; contacts that would pull: a"),
-        (0.0, [False, False], "; contacts that would pull: a, b"),
-    ],
-)
-def test_a_structure_that_nothing_holds_is_told_with_the_contacts_that_would_pull(stiffness, active, said: str) -> None:
+@pytest.mark.parametrize("stiffness", [1e-13, 0.0])
+def test_a_structure_that_nothing_holds_is_told(stiffness: float) -> None:
     """Three masses, of which only the first two may press on something; a force on the third."""
     rows = np.eye(3)
-    contacts = [
-        SimpleNamespace(name=n, normal_row=rows[k], tangent_row=rows[1 - k], compliance=0.0, gap=0.0)
-        for k, n in enumerate("ab")
-    ]
-    nodes = SimpleNamespace(normal=sp.csr_array(rows[:2]))
-    system: Any = SimpleNamespace(
-        contacts=contacts, lines=(), size=3, stiffness=sp.csr_array(np.diag([1.0, 1.0, stiffness])),
-        contact_nodes=lambda: nodes,
-    )  # fmt: skip
-    given = np.array([-1.0, -1.0, 0.5]), np.full(2, 0.1), np.ones(2), np.array(active)
-    with pytest.raises(AnalysisError, match=f"the structure can move freely under its loads{said}; fix a freedom"):
-        points._solve(system, *given)
-    system.stiffness = sp.csr_array(np.diag([2.0, 4.0, 1.0]))
-    u, normal, residual = points._solve(system, *given)
-    for k in range(2):
-        assert u[k] == pytest.approx(0.0 if active[k] else (-1.0 + 0.1 * normal[1 - k]) / (2.0, 4.0)[k], abs=1e-15)
-    assert u[2] == 0.5
+    loads = {"press": np.array([-1.0, -1.0, 0.5])}
+
+    def masses(*springs: float) -> Any:
+        return by_hand(rows, 0 * rows, np.diag(springs), rows[:2], rows[1::-1], math.inf, loads=loads, slip=-1.0)
+
+    with pytest.raises(AnalysisError, match="can move freely under the loads; fix a freedom"):
+        solution.steady_sliding(masses(1.0, 1.0, stiffness), mu=0.1)
+    found = solution.steady_sliding(masses(2.0, 4.0, 1.0), mu=0.1)
     # A contact that presses rubs the mass of the other.
-    if all(active):
-        assert normal == pytest.approx([1 / 1.1, 1 / 1.1])
-    assert residual < 1e-15
+    assert found.normal_force == pytest.approx([1 / 1.1, 1 / 1.1])
+    assert found.displacement == pytest.approx([0.0, 0.0, 0.5], abs=1e-15)
+    assert found.residual < 1e-15
 
 
 @pytest.mark.parametrize(("part", "twice"), [(0.95, True), (1.05, False)])
@@ -684,12 +640,12 @@ def test_what_presses_is_told_from_rounding_of_all_loads() -> None:
 # -- stretches of friction ---------------------------------------------------------------------------------------------
 
 
-def line_of(forces, mu: float, *, kept=()) -> SurfaceSliding:
+def line_of(forces, mu: float, *, kept=()) -> SteadySliding:
     """Steady sliding of nodes whose "force minus gap" is a straight line over μ: each touches where it is positive."""
     value = np.array([a + b * mu for a, b in forces])
     touches = (value > 0) | np.isin(np.arange(len(value)), kept)
     none = np.zeros((len(value), 1))
-    return SurfaceSliding(
+    return SteadySliding(
         np.zeros(0), np.where(touches, value, 0.0), none, none, none, touches, np.full(len(value), mu),
         np.where(touches, 0.0, -1e-6 * value), 0.0, 1, np.where(touches, SLIP, OPEN), np.zeros(0),
     )  # fmt: skip
@@ -705,7 +661,7 @@ def model(monkeypatch, forces, *, own: float = 0.1, size: int = 10, none_beyond:
             raise AnalysisError("it tips over")
         return line_of(forces, at, kept=kept)
 
-    monkeypatch.setattr(stretches, "steady_sliding_nodes", steady)
+    monkeypatch.setattr(stretches, "steady_sliding", steady)
     monkeypatch.setattr(stretches, "other_equilibria", lambda *_: [])
     monkeypatch.setattr(stretches, "FEW", 3)  # as of many nodes
     held = np.isin(np.arange(len(forces)), kept)

@@ -15,7 +15,7 @@ from stridor.contact.multipliers import OPEN, SLIP, STICK
 from stridor.direct import SingularMatrix
 from stridor.errors import AnalysisError
 from stridor.laws import Coulomb, StaticKinetic, Weakening
-from stridor.sliding import history, points, stick_slip, surfaces
+from stridor.sliding import history, motions, solution, stick_slip
 from stridor.sliding.stick_slip import LIMIT, Frictional, Loading, StickRows, StickSlip, _Change
 from stridor.system.load_steps import LoadStep
 
@@ -384,11 +384,11 @@ def test_the_way_through_the_steps_is_told_where_it_ends(monkeypatch) -> None:
 
 def test_motions_are_those_that_run_on_after_the_last_step() -> None:
     moving: Any = SimpleNamespace(load_steps=(step(1.0, (7.0, 7.0)), step(None)), motion=None)
-    assert list(points.full_motion(moving)) == [3, 4]
+    assert list(motions.full_motion(moving)) == [3, 4]
     moving.load_steps = moving.load_steps[::-1]
-    assert list(points.full_motion(moving)) == [0, 0]
+    assert list(motions.full_motion(moving)) == [0, 0]
     moving.load_steps, moving.motion = (), SimpleNamespace(full=np.array([1.0, 0.0]))
-    assert list(points.full_motion(moving)) == [1, 0]
+    assert list(motions.full_motion(moving)) == [1, 0]
 
 
 def test_other_loads_and_motions_than_the_last_are_refused() -> None:
@@ -396,7 +396,7 @@ def test_other_loads_and_motions_than_the_last_are_refused() -> None:
     system: Any = SimpleNamespace(
         loads={"press": 0, "pull": 0, "other": 0}, load_steps=steps, motion=SimpleNamespace(names=("disc", "pad"))
     )
-    require = surfaces._require_last
+    require = solution._require_last
     right = {"press": 2.0, "pull": 0.5, "other": 0.0}
     require(system, None, None)
     require(system, right, np.array([1.0, 0.5]))

@@ -12,7 +12,7 @@ from test_contact_patch import SPACE, contact_of, line, rotation, sheet
 import stridor as st
 from stridor.contact.pairing import repair
 from stridor.mesh.facets import nodal_areas
-from stridor.sliding import steady_sliding_nodes
+from stridor.sliding import steady_sliding
 from stridor.system import build_system
 
 pytestmark = pytest.mark.verification
@@ -258,7 +258,7 @@ def test_a_pad_stands_for_the_area_that_the_disc_covers(disc_is_slave, cells, at
     nodes = system.contact_nodes()
     assert nodes.area.sum() == pytest.approx(area, rel=1e-12)
     if area == 8e-4:
-        steady = steady_sliding_nodes(system, mu=0.4)
+        steady = steady_sliding(system, mu=0.4)
         force = nodes.normal.T @ steady.normal_force
         assert steady.normal_force.sum() == pytest.approx(80.0, rel=1e-9)
         assert np.abs(force).max() > 0

@@ -15,7 +15,7 @@ from stridor.contact.interface import Rows
 from stridor.contact.pairing import pair_surface, repair
 from stridor.laws import Coulomb
 from stridor.mesh.facets import nodal_areas, nodal_normals, pressure_load, reference_nodes, shape_functions
-from stridor.sliding import steady_sliding_nodes
+from stridor.sliding import steady_sliding
 from stridor.sliding.pattern import unexplained_patterns
 from stridor.system import build_system
 
@@ -281,7 +281,7 @@ SOLIDS = ("hexahedron", "hexahedron20", "hexahedron27", "tetra10")
 def test_an_even_pressure_is_even_in_equilibrium(cells, below, above, stiffness):
     for turned in (False, True):
         system = build_system(blocks(cells, below, above, stiffness=stiffness, turned=turned))
-        nodes, steady = system.contact_nodes(), steady_sliding_nodes(system, mu=0.0)
+        nodes, steady = system.contact_nodes(), steady_sliding(system, mu=0.0)
         assert steady.active.all()
         np.testing.assert_allclose(steady.normal_force / nodes.area, 1e6, rtol=1e-6)
 
@@ -319,7 +319,7 @@ friction = {{ law = "coulomb", coefficient = 0.0 }}
 max_frequency_hz = 30e3
 """
     system = build_system(st.loads(text))
-    nodes, steady = system.contact_nodes(), steady_sliding_nodes(system, mu=0.0)
+    nodes, steady = system.contact_nodes(), steady_sliding(system, mu=0.0)
     assert steady.active.all()
     np.testing.assert_allclose(steady.normal_force / nodes.area, 1e6, rtol=1e-7)
 
@@ -358,7 +358,7 @@ def test_an_even_pressure_stays_even_in_time(cells, below, above, stiffness):
 
 def test_steady_sliding_tells_of_nodes_that_open_without_a_reason():
     system = build_system(blocks("hexahedron20", 3, 3))
-    nodes, steady = system.contact_nodes(), steady_sliding_nodes(system, mu=0.0)
+    nodes, steady = system.contact_nodes(), steady_sliding(system, mu=0.0)
     assert steady.warnings == ()
     # What contact taken node by node did: every inner corner of a face open amid middles that touch.
     at = nodes.position / 0.1 * 3

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 import stridor as st
 from stridor.case import loads
 from stridor.errors import AnalysisError, CaseError
-from stridor.sliding import steady_sliding_nodes
+from stridor.sliding import steady_sliding
 from stridor.temporal.energy import energy_balance
 
 pytestmark = pytest.mark.verification
@@ -141,7 +141,7 @@ max_frequency_hz = 30e3
 def dense(case: st.Case, mu: float) -> np.ndarray:
     """Eigenvalues with springs of the tangent stiffness at each node's force, from full matrices."""
     system = st.build_system(case)
-    found, nodes = steady_sliding_nodes(system, mu=mu), system.contact_nodes()
+    found, nodes = steady_sliding(system, mu=mu), system.contact_nodes()
     depth = np.maximum(-found.gap, 0.0)
     assert found.normal_force == pytest.approx(nodes.area * (1e11 * depth + 1e22 * depth**3), rel=1e-9)
     tangent = nodes.area * (1e11 + 3e22 * depth**2)

@@ -31,7 +31,7 @@ from stridor.modal.krylov.passages import crossings
 from stridor.modal.krylov.problem import Varying, problem_of
 from stridor.modal.krylov.reduced import Eigenpairs
 from stridor.modal.onsets import onsets
-from stridor.sliding import friction_damping_matrix, steady_sliding_nodes
+from stridor.sliding import friction_damping_matrix, steady_sliding
 from stridor.system import System, build_system
 from stridor.system.model import PrescribedMotion
 
@@ -393,7 +393,7 @@ def pressed(**more) -> System:
 def test_falling_friction_and_turning_friction_are_in_the_equations():
     system = pressed(law=Weakening(0.2, 0.4, 1.0))
     mu = 0.3
-    steady = steady_sliding_nodes(system, mu=mu)
+    steady = steady_sliding(system, mu=mu)
     assert steady.active.all()
     whole = friction_damping_matrix(system, steady).toarray()
     slopes = [Weakening(0.2, 0.4, 1.0).scaled(mu, float(v)).slope(float(v)) for v in steady.slip_speed]
@@ -408,7 +408,7 @@ def test_falling_friction_and_turning_friction_are_in_the_equations():
 
 def test_power_of_the_slope_of_a_law_is_that_of_its_node_whether_friction_turns_or_not():
     system, mu = pressed(law=Weakening(0.2, 0.4, 1.0)), 0.3
-    steady = steady_sliding_nodes(system, mu=mu)
+    steady = steady_sliding(system, mu=mu)
     slopes = [Weakening(0.2, 0.4, 1.0).scaled(mu, float(v)).slope(float(v)) for v in steady.slip_speed]
     nodes = system.contact_nodes()
     for options in (Options(), Options(friction_damping=True)):
@@ -447,7 +447,7 @@ def test_prestress_is_added_on_demand():
     mu = [0.0, 0.4]
     modes = krylov_modes(system, mu, count=8, options=Options(prestress=True))
     for row, m in enumerate(mu):
-        added = system.stress_stiffness(steady_sliding_nodes(system, mu=m).displacement).toarray()
+        added = system.stress_stiffness(steady_sliding(system, mu=m).displacement).toarray()
         assert distance_to(modes.eigenvalues[row], eliminated(system, m, stiffness=added)).max() < 1e-8
 
 

@@ -20,7 +20,7 @@ def residual_force(system, answer):
     """K u − Σ N (n + μ s t) − f, with the loads at factor one."""
     force = sum(system.loads.values()) - system.motion.damping @ np.ones(len(system.motion.names))
     for k, c in enumerate(system.contacts):
-        push = c.normal_row + answer.friction_coefficient[k] * answer.sense[k] * c.tangent_row
+        push = c.normal_row + answer.friction_coefficient[k] * answer.sense[k, 0] * c.tangent_row
         force = force + answer.normal_force[k] * push
     return system.stiffness @ answer.displacement - force
 
@@ -33,9 +33,9 @@ def test_guided_beam_carries_its_load_whatever_it_leans(mu, lean, velocity):
     system = bench(Slave(lean_deg=lean), velocity=velocity)
     answer = steady_sliding(system, mu=mu)
     assert answer.normal_force[0] == pytest.approx(20.0, rel=1e-9)
-    assert answer.sense[0] == np.sign(velocity)  # friction drags the slave along with the master
+    assert answer.sense[0, 0] == np.sign(velocity)  # friction drags the slave along with the master
     # C_L v pushes the moving body: beam damping acts on a rigid translation through the mass part.
-    assert answer.slip_speed[0] == pytest.approx(-velocity)
+    assert answer.slip_velocity[0, 0] == pytest.approx(-velocity)
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.3, 1.0])

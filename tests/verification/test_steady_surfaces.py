@@ -12,14 +12,15 @@ import scipy.sparse as sp
 import skfem
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
-from benches import Slave, bench, by_hand, paper_case
+from benches import Slave, bench, by_hand, equilibria_by_hand, paper_case
 from stridor import direct
 from stridor.contact.interface import Rows
 from stridor.contact.master import Location
 from stridor.contact.surfaces import SurfaceContact, operators
 from stridor.errors import AnalysisError
 from stridor.laws import Coulomb, Weakening
-from stridor.sliding import friction_damping_matrix, steady_sliding, steady_sliding_nodes, touching
+from stridor.laws.friction import Shared
+from stridor.sliding import force_rates, friction_damping_matrix, steady_sliding, touching
 from stridor.sliding.equilibrium import NodeEquilibrium, offenders
 from stridor.sliding.resultants import resultants
 from stridor.system import System, build_system
@@ -119,7 +120,7 @@ def block(counts, lengths, *, drift, held=(0, 1), pressure=1e5, poisson=0.3, gap
 
 @solvers
 @pytest.mark.parametrize("mu", [None, 0.0, 0.3, 0.8])
-def test_point_contacts_agree_with_their_own_solution(mu, solver):
+def test_point_contacts_agree_with_a_dense_solution_of_every_set(mu, solver):
     for system, tolerance in (
         (bench(Slave(end="clamped", stiffness=2e6, force=5.0)), 1e-10),
         (bench(Slave(stiffness="rigid")), 1e-10),
@@ -127,14 +128,12 @@ def test_point_contacts_agree_with_their_own_solution(mu, solver):
         (bench(Slave(0.3), Slave(0.6, lean_deg=-10, stiffness="rigid"), Slave(0.8, side=-1)), 1e-8),
         (build_system(paper_case()), 1e-8),
     ):
-        point = steady_sliding(system, mu=mu)
-        nodal = steady_sliding_nodes(system, mu=mu, solver=solver)
-        size = np.abs(point.displacement).max()
-        assert np.allclose(nodal.displacement, point.displacement, rtol=0, atol=tolerance * size)
-        assert np.allclose(nodal.normal_force, point.normal_force, rtol=tolerance)
-        assert np.array_equal(nodal.active, point.active)
-        assert np.array_equal(nodal.sense[:, 0], point.sense)
-        assert np.array_equal(nodal.friction_coefficient, point.friction_coefficient)
+        ((displacement, force, active),) = equilibria_by_hand(system, mu)
+        nodal = steady_sliding(system, mu=mu, solver=solver)
+        size = np.abs(displacement).max()
+        assert np.allclose(nodal.displacement, displacement, rtol=0, atol=tolerance * size)
+        assert np.allclose(nodal.normal_force, force, rtol=tolerance)
+        assert np.array_equal(nodal.active, active)
         assert nodal.residual < 1e-13
 
 
@@ -148,15 +147,67 @@ def test_contacts_that_lift_off_are_the_same_ones(solver):
         loads = {"f": rng.standard_normal(6)}
         normal, tangent = rng.standard_normal((2, 4, 6))
         system = by_hand(np.eye(6), np.zeros((6, 6)), factor @ factor.T + np.eye(6), normal, tangent, 30.0, loads=loads)
-        try:
-            point = steady_sliding(system, mu=0.1)
-        except AnalysisError:
+        right = [found for found in equilibria_by_hand(system, 0.1) if found[2].any()]
+        if not right:
+            with pytest.raises(AnalysisError):
+                steady_sliding(system, mu=0.1, solver=solver)
             continue
-        nodal = steady_sliding_nodes(system, mu=0.1, solver=solver)
-        opened += int(np.sum(~point.active))
-        assert np.array_equal(nodal.active, point.active)
-        assert np.allclose(nodal.displacement, point.displacement, rtol=1e-10, atol=1e-12)
+        ((displacement, _, active),) = right
+        nodal = steady_sliding(system, mu=0.1, solver=solver)
+        opened += int(np.sum(~active))
+        assert np.array_equal(nodal.active, active)
+        assert np.allclose(nodal.displacement, displacement, rtol=1e-10, atol=1e-12)
     assert opened > 10
+
+
+@pytest.mark.parametrize("first", [0, pytest.param(100, marks=pytest.mark.slow)])
+def test_an_equilibrium_is_found_where_there_is_one_and_is_one_of_those(first):
+    """Random structures on contacts open and kept closed, rigid, stiff and soft, with gaps and with much friction."""
+    several = refused = pulled = 0
+    for seed in range(first, first + (60 if not first else 3000)):
+        rng = np.random.default_rng(seed)
+        n, m = rng.integers(2, 9), int(rng.integers(1, 5))
+        half, scale = rng.normal(size=(n, n)), 10.0 ** rng.integers(-3, 9)
+        stiffness = [float(rng.choice([np.inf, scale, scale * 1e5, scale * 1e-2])) for _ in range(m)]
+        system = by_hand(
+            np.eye(n), np.zeros((n, n)), scale * (half @ half.T + np.eye(n)), *rng.normal(size=(2, m, n)), stiffness,
+            slip=rng.choice([-1, 1]), loads={"f": scale * rng.normal(size=n)},
+        )  # fmt: skip
+        contacts = [
+            replace(c, gap=float(rng.choice([0, abs(rng.normal())])), closed=bool(rng.random() < 0.3))
+            for c in system.contacts
+        ]
+        system, mu = replace(system, contacts=tuple(contacts)), float(rng.choice([0, 0.1, 0.5, 1.5]))
+        right = [found for found in equilibria_by_hand(system, mu) if found[2].any()]
+        several += len(right) > 1
+        try:
+            found = steady_sliding(system, mu=mu)
+        except AnalysisError:
+            assert not right or len(right) < len(equilibria_by_hand(system, mu))  # it found that in which none touches
+            refused += not right
+            continue
+        pulled += bool((found.normal_force < 0).any())
+        assert any(
+            np.array_equal(found.active, active)
+            and np.allclose(found.normal_force, force, rtol=1e-6, atol=1e-9 * np.abs(force).max())
+            and np.allclose(found.displacement, displacement, rtol=1e-6, atol=1e-9 * np.abs(force).max() / scale)
+            for displacement, force, active in right
+        ), seed
+    assert min(several, refused, pulled) > 1
+
+
+def test_normal_forces_change_with_friction_as_differences_say():
+    rng = np.random.default_rng(11)
+    for _ in range(8):
+        half, rows = rng.normal(size=(6, 6)), rng.normal(size=(2, 3, 6))
+        stiffness = half @ half.T + np.eye(6)
+        system = by_hand(np.eye(6), 0 * half, stiffness, *rows, [np.inf, 3.0, 1e4], slip=-1.0, loads={"f": rng.normal(size=6)})
+        contacts = [replace(c, closed=True) for c in system.contacts]
+        contacts[1] = replace(contacts[1], law=Shared(Coulomb(0.2), 0.4))
+        system, mu, step = replace(system, contacts=tuple(contacts)), 0.15, 1e-5
+        before, here, after = (steady_sliding(system, mu=m) for m in (mu - step, mu, mu + step))
+        change = (after.normal_force - before.normal_force) / (2 * step)
+        assert np.allclose(force_rates(system, here), change, rtol=1e-6, atol=1e-7 * np.abs(change).max())
 
 
 @solvers
@@ -166,7 +217,7 @@ def test_a_block_pressed_evenly_presses_evenly(stiffness, solver):
     for counts, lengths in (((7, 4), (0.1, 0.05)), ((4, 3, 3), (0.1, 0.08, 0.05))):
         d = len(counts)
         system = block(counts, lengths, drift=np.eye(d)[0] * 0.1, stiffness=stiffness, poisson=0.0)
-        answer = steady_sliding_nodes(system, mu=0.0, solver=solver)
+        answer = steady_sliding(system, mu=0.0, solver=solver)
         nodes = system.contact_nodes()
         assert np.allclose(answer.normal_force / nodes.area, 1e5, rtol=1e-9)
         total = answer.resultants["flat"]
@@ -186,7 +237,7 @@ def test_friction_on_a_block_shifts_its_pressure_to_the_leading_edge(direction):
     """Held at the height h of its top: friction μN at the bottom turns it, and pressure moves by μ h to balance."""
     mu, height = 0.2, 0.05
     system = block((20, 10), (0.1, height), drift=np.array([0.1 * direction, 0.0]))
-    answer = steady_sliding_nodes(system, mu=mu)
+    answer = steady_sliding(system, mu=mu)
     total = answer.resultants["flat"]
     load = 1e5 * 0.1
     assert answer.active.all()
@@ -204,7 +255,7 @@ def test_moments_are_about_the_origin(d):
     system = block(
         (4, 3) if d == 2 else (4, 3, 2), (0.1, 0.06, 0.05)[3 - d :], drift=np.array([0.1, -0.05, 0.0])[3 - d :]
     )
-    answer = steady_sliding_nodes(system)
+    answer = steady_sliding(system)
     nodes, shift = system.contact_nodes(), np.array([0.3, -0.2, 0.7])[:d]
     moved = replace(nodes, position=nodes.position + shift)
     total, elsewhere = (
@@ -219,7 +270,7 @@ def test_moments_are_about_the_origin(d):
 def test_friction_in_space_opposes_the_slip_of_every_node(solver):
     direction = np.array([0.6, -0.8, 0.0])
     system = block((4, 5, 3), (0.1, 0.08, 0.03), drift=0.02 * direction)
-    answer = steady_sliding_nodes(system, solver=solver)
+    answer = steady_sliding(system, solver=solver)
     nodes = system.contact_nodes()
     total = answer.resultants["flat"]
     assert np.allclose(total.force, 1e5 * 0.1 * 0.08 * np.array([-0.3 * 0.6, 0.3 * 0.8, 1.0]), rtol=1e-9)
@@ -236,7 +287,7 @@ def test_a_spinning_block_is_held_back_by_mu_times_pressure_times_radius():
         return spin * np.stack([-x[:, 1], x[:, 0] + 1e-14, 0 * x[:, 0]], axis=1)
 
     system = block((10, 10, 2), (side, side, 0.05), drift=drift, poisson=0.0)
-    answer = steady_sliding_nodes(system, mu=mu)
+    answer = steady_sliding(system, mu=mu)
     nodes = system.contact_nodes()
     centre = int(np.argmin(np.linalg.norm(nodes.position, axis=1)))
     assert np.array_equal(answer.sense[centre], [0.0, 0.0])
@@ -269,7 +320,7 @@ def test_an_overturned_block_lifts_off_on_one_side(part):
     """Rigid on a Winkler foundation: within L/6 p = P/L (1 ± 6e/L); beyond, 3 (L/2 − e) stays pressed."""
     length, load = 0.2, 1e3
     offset = part * length
-    answer = steady_sliding_nodes(rigid_block(offset), mu=0.0)
+    answer = steady_sliding(rigid_block(offset), mu=0.0)
     total = answer.resultants["flat"]
     e = abs(offset)
     if e <= length / 6:
@@ -286,7 +337,7 @@ def test_an_overturned_block_lifts_off_on_one_side(part):
 
 def test_a_block_loaded_beyond_its_edge_tips_over():
     with pytest.raises(AnalysisError, match=r"has no equilibrium|no contact carries load"):
-        steady_sliding_nodes(rigid_block(0.11), mu=0.0)
+        steady_sliding(rigid_block(0.11), mu=0.0)
 
 
 @solvers
@@ -317,7 +368,7 @@ def test_a_cylinder_on_a_half_plane_presses_as_hertz_says(solver):
     force[count] = -load
     n = count + 1
     system = System(np.eye(n), np.zeros((n, n)), stiffness, (), {"P": force}, moving(n), surfaces=(contact,))
-    answer = steady_sliding_nodes(system, mu=0.3, solver=solver)
+    answer = steady_sliding(system, mu=0.3, solver=solver)
     peak = 2 * load / (math.pi * half)
     pressure = answer.normal_force / width
     expected = peak * np.sqrt(np.maximum(1 - (x / half) ** 2, 0))
@@ -338,7 +389,7 @@ def test_a_convex_block_settles_with_friction(stiffness, solver):
         (10, 10, 3), (0.1, 0.1, 0.04), drift=np.array([0.05, 0.02, 0.0]), stiffness=stiffness,
         gap=lambda x: (x[:, 0] ** 2 + x[:, 1] ** 2) / 2 / 100.0, pressure=1e6,
     )  # fmt: skip
-    answer = steady_sliding_nodes(system, solver=solver)
+    answer = steady_sliding(system, solver=solver)
     nodes = system.contact_nodes()
     assert 10 < answer.active.sum() < nodes.count - 10
     assert np.all(answer.normal_force[answer.active] > 0)
@@ -351,10 +402,10 @@ def test_a_convex_block_settles_with_friction(stiffness, solver):
     assert answer.iterations < 12
     assert touching(system, answer).count == answer.active.sum()
     # Begun from its own answer it is settled; begun from nothing, which does not hold the block, it gets there too.
-    again = steady_sliding_nodes(system, guess=answer.active, solver=solver)
+    again = steady_sliding(system, guess=answer.active, solver=solver)
     assert again.iterations == 1
     assert np.array_equal(again.normal_force, answer.normal_force)
-    anew = steady_sliding_nodes(system, guess=np.zeros(nodes.count, dtype=bool), solver=solver)
+    anew = steady_sliding(system, guess=np.zeros(nodes.count, dtype=bool), solver=solver)
     assert np.array_equal(anew.active, answer.active)
 
 
@@ -364,7 +415,7 @@ def test_sets_that_would_go_in_circles_settle_all_the_same():
     one = np.eye(3)
     system = by_hand(one, 0 * one, one, one, coupling.T - one, math.inf, slip=-1.0, loads={"f": -np.ones(3)})
     for guess in ([1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 0, 0]):
-        answer = steady_sliding_nodes(system, mu=1.0, guess=np.array(guess, dtype=bool))
+        answer = steady_sliding(system, mu=1.0, guess=np.array(guess, dtype=bool))
         assert np.allclose(answer.normal_force, 1 / 3)
 
 
@@ -378,12 +429,12 @@ def test_springs_beyond_the_linear_carry_their_share():
         np.eye(1), np.zeros((1, 1)), np.array([[stiffness]]), (), {"P": np.array([-load])}, moving(1),
         surfaces=(contact,), cubic=spring,
     )  # fmt: skip
-    answer = steady_sliding_nodes(system)
+    answer = steady_sliding(system)
     assert answer.displacement[0] == pytest.approx(-gap, rel=1e-12)
     assert answer.normal_force[0] == pytest.approx(load - stiffness * gap - cubic * gap**3, rel=1e-10)
     assert answer.residual < 1e-12
     with pytest.raises(AnalysisError, match="no contact carries load"):
-        steady_sliding_nodes(system, load_factors={"P": 0.1})
+        steady_sliding(system, load_factors={"P": 0.1})
 
 
 def test_damping_of_friction_is_the_derivative_of_the_friction_force():
@@ -396,7 +447,7 @@ def test_damping_of_friction_is_the_derivative_of_the_friction_force():
         law=law,
     )
     for mu in (None, 0.4):
-        steady = steady_sliding_nodes(system, mu=mu)
+        steady = steady_sliding(system, mu=mu)
         matrix = friction_damping_matrix(system, steady)
         nodes = system.contact_nodes()
         motion = np.random.default_rng(1).standard_normal(system.size)
@@ -416,7 +467,7 @@ def test_damping_of_friction_is_the_derivative_of_the_friction_force():
 
 def test_a_structure_without_contacts_only_deforms():
     system = System(np.eye(2), np.zeros((2, 2)), 2 * np.eye(2), (), {"P": np.array([1.0, -3.0])})
-    answer = steady_sliding_nodes(system)
+    answer = steady_sliding(system)
     assert np.allclose(answer.displacement, [0.5, -1.5])
     assert answer.normal_force.shape == (0,)
     assert touching(system, answer).count == 0
@@ -426,21 +477,21 @@ def test_a_structure_without_contacts_only_deforms():
 def test_what_has_no_answer_says_why():
     still = block((3, 2), (0.1, 0.05), drift=np.zeros(2))
     with pytest.raises(AnalysisError, match="contact flat does not slide"):
-        steady_sliding_nodes(still)
-    assert steady_sliding_nodes(still, mu=0.0).active.all()
+        steady_sliding(still)
+    assert steady_sliding(still, mu=0.0).active.all()
     system = block((3, 2), (0.1, 0.05), drift=np.array([0.1, 0.0]))
     with pytest.raises(AnalysisError, match=r"the loads pull the bodies apart|body block can move freely"):
-        steady_sliding_nodes(system, load_factors={"press": -1.0})
+        steady_sliding(system, load_factors={"press": -1.0})
     loose = block((3, 2), (0.1, 0.05), drift=np.array([0.1, 0.0]), held=())
     with pytest.raises(AnalysisError, match="body block can move freely"):
-        steady_sliding_nodes(loose, mu=0.0)
+        steady_sliding(loose, mu=0.0)
     surface = system.surfaces[0]
     lifted = replace(surface, nodes=replace(surface.nodes, normal_lift=np.full((4, 1), 1e-3)))
     with pytest.raises(AnalysisError, match=r"contact flat: the prescribed velocities change its gap at 0\.001 m/s"):
-        steady_sliding_nodes(replace(system, surfaces=(lifted,)))
+        steady_sliding(replace(system, surfaces=(lifted,)))
     twice = replace(system, surfaces=(surface, replace(surface, nodes=replace(surface.nodes, names=("again",)))))
     with pytest.raises(AnalysisError, match="presses on the same freedoms twice"):
-        steady_sliding_nodes(twice)
+        steady_sliding(twice)
 
 
 def test_only_what_is_beyond_rounding_pulls_or_penetrates():

@@ -21,8 +21,8 @@ from stridor.case import loads
 from stridor.contact.multipliers import OPEN, SLIP, STICK
 from stridor.errors import AnalysisError, CaseError
 from stridor.laws import Coulomb
-from stridor.sliding import steady_sliding_nodes
-from stridor.sliding.surfaces import SurfaceSliding
+from stridor.sliding import steady_sliding
+from stridor.sliding.solution import SteadySliding
 from stridor.system import System
 from stridor.system.load_steps import LoadStep
 from stridor.temporal.settings import Settings
@@ -222,7 +222,7 @@ def ellipse(x: np.ndarray, half: float) -> np.ndarray:
     return np.sqrt(np.clip(1 - (x / half) ** 2, 0.0, None)) * half
 
 
-def traction(found: SurfaceSliding, system: System) -> np.ndarray:
+def traction(found: SteadySliding, system: System) -> np.ndarray:
     return -found.friction_force[:, 0] / system.contact_nodes().area
 
 
@@ -233,7 +233,7 @@ PRESS = ({"press": 1.0, "pull": 0.0}, 2)
 def test_a_cylinder_pulled_sideways_slips_as_cattaneo_and_mindlin_say(part):
     mu, elements = 0.4, 20
     system, x, force = cylinder_on_a_flat(elements, mu, PRESS, ({"press": 1.0, "pull": part}, 3))
-    found = steady_sliding_nodes(system)
+    found = steady_sliding(system)
     stick = math.sqrt(1 - part)
     largest = 2 * force / math.pi
     assert np.abs(x[found.status == STICK]).max() == pytest.approx(stick, abs=1.0 / elements)
@@ -250,7 +250,7 @@ def test_unloading_slips_back_in_an_annulus_of_its_own():
     system, x, force = cylinder_on_a_flat(
         elements, mu, PRESS, ({"press": 1.0, "pull": high}, 3), ({"press": 1.0, "pull": low}, 3)
     )
-    found = steady_sliding_nodes(system)
+    found = steady_sliding(system)
     first, second = math.sqrt(1 - high), math.sqrt(1 - (high - low) / 2)
     exact = ellipse(x, 1.0) - ellipse(x, first) - 2 * (ellipse(x, 1.0) - ellipse(x, second))
     largest = 2 * force / math.pi
@@ -263,7 +263,7 @@ def test_unloading_slips_back_in_an_annulus_of_its_own():
 PAD = Path(__file__).parent / "pad_at_an_abutment.toml"
 
 
-def dense_modes(system: System, found: SurfaceSliding, mu: float) -> np.ndarray:
+def dense_modes(system: System, found: SteadySliding, mu: float) -> np.ndarray:
     """Eigenvalues by elimination of everything that contact holds, friction on the sliding nodes alone."""
     nodes = system.contact_nodes()
     touch, stick, rigid = found.status != OPEN, found.status == STICK, nodes.compliance == 0.0

@@ -33,8 +33,8 @@ from stridor.modal.krylov.refine import GUARD, Band, converge_at, projected
 from stridor.modal.onset import Onset, Onsets
 from stridor.modal.options import Options
 from stridor.sliding import stretches as finding
+from stridor.sliding.solution import steady_sliding
 from stridor.sliding.stretches import Stretch, stretches
-from stridor.sliding.surfaces import steady_sliding_nodes
 from stridor.system import System, build_system
 
 pytestmark = pytest.mark.verification
@@ -64,7 +64,7 @@ def listed(found: st.ComplexModes, row: int) -> np.ndarray:
 def same_on_a_grid(case: st.Case, low: float, high: float, count: int) -> list[float]:
     """μ at which the nodes that touch are others than just below it, found by trying many; to half a step."""
     system, grid = build_system(case), np.linspace(low, high, count)
-    active = [steady_sliding_nodes(system, mu=float(mu)).active for mu in grid]
+    active = [steady_sliding(system, mu=float(mu)).active for mu in grid]
     return [0.5 * (a + b) for a, b, x, y in zip(grid, grid[1:], active, active[1:], strict=False) if np.any(x != y)]
 
 
@@ -79,7 +79,7 @@ def test_changes_are_where_many_equilibria_see_them(coefficient: float) -> None:
     for before, after in pairwise(found):
         # Enclosed to 1e-9: on both sides close by touch as many as said.
         for s, mu in ((before, before.high - 2e-9), (after, after.low + 2e-9)):
-            assert int(steady_sliding_nodes(system, mu=mu).active.sum()) == s.touching
+            assert int(steady_sliding(system, mu=mu).active.sum()) == s.touching
 
 
 def test_modes_at_a_friction_do_not_depend_on_the_others() -> None:

@@ -14,7 +14,7 @@ from ..io.atomic import replacing, write_text
 from ..io.vtk import write_vtk
 from ..modal.complex_modes import ComplexModes
 from ..modal.options import Options
-from ..sliding.surfaces import SurfaceSliding
+from ..sliding.solution import SteadySliding
 from ..stages import passing, stage
 from ..study import analyses
 from ..study.workspace import Problem, Workspace
@@ -140,7 +140,7 @@ def _energy_pictures(system: System, energy: Array, path: Path) -> list[Path]:
     return files
 
 
-def write_steady(problem: Problem, steady: SurfaceSliding, folder: Path) -> list[Path]:
+def write_steady(problem: Problem, steady: SteadySliding, folder: Path) -> list[Path]:
     """Pressure of each contact as PNG, and displacement and pressure as VTK files."""
     from ..view.field_plots import contact_snapshot
 
@@ -179,7 +179,7 @@ def write_steady(problem: Problem, steady: SurfaceSliding, folder: Path) -> list
     return files
 
 
-def steady_document(steady: SurfaceSliding) -> dict[str, Any]:
+def steady_document(steady: SteadySliding) -> dict[str, Any]:
     """What `stridor steady --json` prints."""
     names = ("open", "stick", "slip")
     counted = {name: int(np.count_nonzero(steady.status == code)) for code, name in enumerate(names)}

@@ -21,7 +21,7 @@ import scipy.sparse as sp
 
 from ..errors import AnalysisError
 from ..laws.friction import share_of, slope_at
-from ..sliding import full_motion, least_force, require_pressed, slip_speeds, steady_points, steady_sliding
+from ..sliding import force_rates, full_motion, least_force, require_pressed, slip_speeds, steady_nodes, steady_sliding
 from ..system import System
 from ..typing import Array, ComplexArray
 from .pencil import Pencil
@@ -48,32 +48,34 @@ class PointCoupling:
 
     def friction_damping(self, mu: float) -> Array:
         """d = N dμ/d|v| (m,) [N s/m] at steady sliding with coefficient ``mu``."""
+        return self.friction_damping_slope(mu)[0]
+
+    def friction_damping_slope(self, mu: float) -> tuple[Array, Array]:
+        """d and its derivative in μ (m,)."""
         if not self.sloped or mu == 0.0:
-            return np.zeros(self.contacts)
+            zero = np.zeros(self.contacts)
+            return zero, self._slopes(1.0) * self._forces(0.0)[0] if self.sloped else zero
         # Newton's method asks at one μ once for every root.
         return self.system.once(("friction damping", mu), lambda: self._friction_damping(mu))
 
-    def _friction_damping(self, mu: float) -> Array:
-        speeds = np.abs(self.slip_speed)
-        steady = steady_sliding(self.system, mu=mu)
-        slopes = [
-            slope_at(c.law, share_of(c.law) * mu, float(v))
-            for c, v in zip(self.system.contacts, speeds, strict=True)
-        ]
-        found = np.abs(steady.normal_force) * np.array(slopes)
-        found.setflags(write=False)
-        return found
+    def _friction_damping(self, mu: float) -> tuple[Array, Array]:
+        (force, rate), step = self._forces(mu), 1e-4 * mu
+        slopes = self._slopes(mu)
+        # As good as exact: laws are scaled to μ, and slopes with them.
+        turning = (self._slopes(mu + step) - self._slopes(mu - step)) / (2.0 * step)
+        return _kept(force * slopes), _kept(rate * slopes + force * turning)
 
-    def friction_damping_slope(self, mu: float) -> tuple[Array, Array]:
-        """d and its derivative in μ (m,), the derivative by a central difference."""
-        if not self.sloped:
-            zero = np.zeros(self.contacts)
-            return zero, zero
-        step = 1e-5 * max(mu, 1e-2)
-        low = max(mu - step, 0.0)
-        high = mu + step
-        slope = (self.friction_damping(high) - self.friction_damping(low)) / (high - low)
-        return self.friction_damping(mu), slope
+    def _slopes(self, mu: float) -> Array:
+        """dμ/d|v| (m,) [s/m] of the laws, each with its share of ``mu``."""
+        speeds = np.abs(self.slip_speed)
+        laws = [c.law for c in self.system.contacts]
+        return np.array([slope_at(law, share_of(law) * mu, float(v)) for law, v in zip(laws, speeds, strict=True)])
+
+    def _forces(self, mu: float) -> tuple[Array, Array]:
+        """|N| (m,) and its derivative in μ."""
+        steady = steady_sliding(self.system, mu=mu)
+        sign = np.where(steady.normal_force < 0.0, -1.0, 1.0)
+        return sign * steady.normal_force, sign * force_rates(self.system, steady)
 
     def matrices(
         self, lam: ComplexArray, mu: float | complex, receptance: ComplexArray, slope: ComplexArray
@@ -123,6 +125,12 @@ class PointCoupling:
         return np.stack([normal, tangential], axis=2).reshape(len(null), 2 * m)
 
 
+def _kept(values: Array) -> Array:
+    """An answer that nobody changes, as others get the same one."""
+    values.setflags(write=False)
+    return values
+
+
 def _blocks(a: ComplexArray, b: ComplexArray, c: ComplexArray, d: ComplexArray) -> ComplexArray:
     return np.concatenate([np.concatenate([a, b], axis=2), np.concatenate([c, d], axis=2)], axis=1)
 
@@ -134,7 +142,7 @@ def couple(system: System, *, mu: float | None = None) -> tuple[PointCoupling, t
     velocities = full_motion(system)
     system = system.in_place()
     if system.contacts and system.loads:
-        steady = steady_points(system, mu if system.touching_at is None else system.touching_at)
+        steady = steady_nodes(system, mu if system.touching_at is None else system.touching_at)
         require_pressed(system, steady.normal_force)
         # A contact that only rounding presses is not closed, unless it is kept so.
         kept = np.array([c.closed for c in system.contacts], dtype=bool)

@@ -265,7 +265,7 @@ def share_factors(system: System, factors: direct.Nearby) -> None:
 
 
 def find_touching(
-    equilibrium: Equilibrium, guess: BoolArray | None = None, *, limit: int = 60
+    equilibrium: Equilibrium, guess: BoolArray | None = None, *, limit: int = 60, at: str = ""
 ) -> tuple[NodeEquilibrium, int]:
     """Find the touching nodes: N ≥ 0 where they touch, gap ≥ 0 where they do not. Also returns the steps taken. Nodes
     of contacts kept closed touch, whichever the sign of N.
@@ -275,8 +275,8 @@ def find_touching(
     settles in a few steps. Where it returns to a set it has seen, it goes on more carefully: first letting go only,
     then half of the worst offenders, then the first in the list alone, which is certain to end where the contact
     problem has one solution (Murty 1974). Where letting go frees the structure, fewer are let go. With much
-    friction that may go round in circles though there is an equilibrium: of few nodes all sets are then tried. Raises
-    direct.SingularMatrix, or AnalysisError where nothing settles.
+    friction that may go round in circles though there is an equilibrium: of few nodes all sets are then tried. at:
+    where, as in " at μ = 0.3". Raises direct.SingularMatrix, or AnalysisError where nothing settles.
     """
     nodes = equilibrium.nodes
     # A node that no freedom moves along its normal (held, over an obstacle) can neither press nor give way.
@@ -313,17 +313,28 @@ def find_touching(
             care += 1
             seen.clear()
             active = changed(state.active, pulled, closing, care)
-    free = np.flatnonzero(movable & ~kept)
-    if len(free) <= FEW:
-        for active in sets_near(movable, free):
-            try:
-                state = equilibrium.solve(active)
-            except direct.SingularMatrix:
-                continue
-            pulled, closing = offenders(state, movable, load)
-            if kept[pulled].all() and not len(closing):
-                return state, limit
-    raise AnalysisError(f"steady sliding: {unsettled(len(free), limit)}")
+    if (found := next(of_every_set(equilibrium), None)) is not None:
+        return found, limit
+    raise AnalysisError(f"steady sliding{at}: {unsettled(int(np.count_nonzero(movable & ~kept)), limit)}")
+
+
+def of_every_set(equilibrium: Equilibrium) -> Iterator[NodeEquilibrium]:
+    """What `find_touching` looks for, among all sets of touching nodes, those of which most touch first; of more than a
+    few nodes nothing."""
+    nodes = equilibrium.nodes
+    movable = np.diff(nodes.normal.indptr) > 0
+    free = np.flatnonzero(movable & ~nodes.kept)
+    if len(free) > FEW:
+        return
+    load = float(np.abs(equilibrium.force).max(initial=0.0))
+    for active in sets_near(movable, free):
+        try:
+            state = equilibrium.solve(active)
+        except direct.SingularMatrix:
+            continue
+        pulled, closing = offenders(state, movable, load)
+        if nodes.kept[pulled].all() and not len(closing):
+            yield state
 
 
 def sets_near(active: BoolArray, free: IntArray) -> Iterator[BoolArray]:

@@ -72,10 +72,11 @@ def nearly_one(system: System, touches: BoolArray, rigid: BoolArray) -> str:
     return ""
 
 
-def closed(active: BoolArray, gap: Array, displacement: Array) -> BoolArray:
-    """Nodes (m,) that touch, with a force or without: where another one took the whole force, both could have it."""
+def closed(active: BoolArray, gap: Array, displacement: Array, rounding: float = 0.0) -> BoolArray:
+    """Nodes (m,) that touch, with a force or without: where another one took the whole force, both could have it.
+    rounding [m]: of gaps."""
     scale = max(float(np.abs(displacement).max(initial=0.0)), float(np.abs(gap).max(initial=0.0)))
-    return active | (np.abs(gap) <= FAINT * scale)
+    return active | (np.abs(gap) <= max(FAINT * scale, rounding))
 
 
 def _entangled(rows: Sparse, size: Array) -> IntArray:

@@ -17,7 +17,7 @@ from ..errors import AnalysisError, NotSlidingError
 from ..system import System
 from ..typing import Array, BoolArray
 from .equilibrium import FEW
-from .surfaces import ALL_TRIED, STEADY, SurfaceSliding, other_equilibria, steady_nodes, steady_sliding_nodes
+from .solution import ALL_TRIED, STEADY, SteadySliding, other_equilibria, steady_nodes, steady_sliding
 
 HELD = "are held at every μ of the model"  # nodes of one friction coefficient
 HELD_AT_ALL = "are held at all values of the model"
@@ -62,7 +62,7 @@ class _Look:
 
     mu: float
     key: bytes | None
-    found: SurfaceSliding | None
+    found: SteadySliding | None
     reason: str = ""
 
 
@@ -224,7 +224,7 @@ class _Equilibria:
         nodes = system.contact_nodes()
         self.count, self.free = nodes.count, int(np.count_nonzero(~nodes.kept))
 
-    def others(self, mu: float, found: SurfaceSliding) -> bool:
+    def others(self, mu: float, found: SteadySliding) -> bool:
         """Whether other nodes may touch at ``mu`` as well, as far as all sets are tried."""
         return bool(other_equilibria(self._system, found, mu))
 
@@ -273,10 +273,10 @@ class _Equilibria:
             return _Look(mu, None, None, f"{error}; that is at μ = {mu:.6g}")
         return _Look(mu, _key(found), found)
 
-    def _solved(self, mu: float | None) -> SurfaceSliding:
-        def solved() -> SurfaceSliding:
+    def _solved(self, mu: float | None) -> SteadySliding:
+        def solved() -> SteadySliding:
             guess = None if mu is None else self._near(mu)
-            return steady_sliding_nodes(self._system, mu=mu, guess=guess, solver=self._solver)
+            return steady_sliding(self._system, mu=mu, guess=guess, solver=self._solver)
 
         return self._system.once((STEADY, mu, self._solver), solved)
 
@@ -339,7 +339,7 @@ class _Along(_Equilibria):
         super().__init__(own, solver)
         self._system_at, self._scale, self._rubs = system_at, scale, rubs
 
-    def others(self, mu: float, found: SurfaceSliding) -> bool:
+    def others(self, mu: float, found: SteadySliding) -> bool:
         return bool(other_equilibria(self._system_at(mu), found, mu if self._rubs else None))
 
     def size(self, mu: float) -> float:
@@ -387,12 +387,12 @@ def _different(one: _Look, other: _Look) -> int:
     return int(np.count_nonzero(one.found.active != other.found.active))
 
 
-def _key(found: SurfaceSliding) -> bytes:
+def _key(found: SteadySliding) -> bytes:
     """What modes hold of steady sliding: who touches, and which way friction goes where a kept contact pulls."""
     pulls = found.active & (found.normal_force < 0.0)
     return np.concatenate([found.active, pulls]).tobytes()
 
 
-def _margin(found: SurfaceSliding) -> Array:
+def _margin(found: SteadySliding) -> Array:
     """What may run out, per node (m,): the normal force where it touches, the gap where it is open."""
     return np.where(found.active, found.normal_force, found.gap)

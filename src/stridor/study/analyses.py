@@ -28,8 +28,8 @@ from ..modal.painleve import steps_undetermined
 from ..modal.receptance_modes import prepare
 from ..modal.source import by_receptance, require_full
 from ..sliding import taken_as_closed
+from ..sliding.solution import SteadySliding, other_equilibria
 from ..sliding.stretches import instead_of_own
-from ..sliding.surfaces import SurfaceSliding, other_equilibria
 from ..system import System
 from ..temporal.settings import Settings
 from ..temporal.simulate import Checkpoint, Progress, plan
@@ -193,7 +193,7 @@ def _held_by_factors(work: Workspace, own: float | None) -> tuple[str, ...]:
     )
 
 
-def steady_sliding(problem: Problem, mu: float | None = None) -> SurfaceSliding:
+def steady_sliding(problem: Problem, mu: float | None = None) -> SteadySliding:
     """The equilibrium under load and friction that both approaches start from, node by node of every contact.
 
     mu replaces the friction coefficient of every contact that has friction. Where more than one set of a few contact

@@ -19,7 +19,7 @@ from ..mesh.model import Mesh
 from ..mesh.quality import edge_lengths, pieces
 from ..notebook import Shown, counted, html_table
 from ..sliding import steady_nodes
-from ..sliding.surfaces import SurfaceSliding
+from ..sliding.solution import SteadySliding
 from ..system import System
 from ..temporal.inputs import unfit_in_time
 from ..temporal.schedule import lay_out
@@ -360,7 +360,7 @@ def _interference_words(interference: float) -> str:
     return f"a negative interference, a gap of {-interference:g} m beside that of the meshes, which loads have to close"
 
 
-def balance_words(steady: SurfaceSliding) -> str:
+def balance_words(steady: SteadySliding) -> str:
     """How well the equilibrium is solved, and loads balanced by the contacts where nothing else holds a body."""
     text = f"equilibrium of every freedom to {steady.residual:.1e} of the largest force"
     parts = [

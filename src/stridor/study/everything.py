@@ -16,7 +16,7 @@ from ..case.matrix_checks import MU
 from ..errors import AnalysisError
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onsets
-from ..sliding.surfaces import SurfaceSliding
+from ..sliding.solution import SteadySliding
 from ..system import System
 from ..temporal.shapes import operating_shape
 from ..temporal.simulate import Progress
@@ -73,7 +73,7 @@ class Everything:
     notes: tuple[str, ...] = field(default=())
     mu: float | None = None
     own: ComplexModes | None = None
-    steady: SurfaceSliding | None = None
+    steady: SteadySliding | None = None
     vector: ComplexArray | None = None
     energy: Array | None = None
     sensitivities: Sensitivities | None = None

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..case import Case
 from ..errors import AnalysisError
-from ..sliding import least_force, nothing_presses, steady_nodes, steady_sliding_nodes
+from ..sliding import least_force, nothing_presses, steady_nodes, steady_sliding
 from ..system import System
 from ..typing import Array
 from .workspace import Workspace
@@ -92,7 +92,7 @@ def _press(case: Case, system: System, factors: Mapping[str, float], phase: int)
         if np.all(motion == 1.0) and all(factors.get(name, 1.0) == 1.0 for name in system.loads):
             steady = steady_nodes(system)  # which others ask for as well
         else:
-            steady = steady_sliding_nodes(system, load_factors=dict(factors), motion_factors=motion)
+            steady = steady_sliding(system, load_factors=dict(factors), motion_factors=motion)
     except AnalysisError:
         return True
     return not nothing_presses(system, steady.normal_force)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..errors import AnalysisError
 from ..sliding.pattern import BY_MESHES, facet_height
-from ..sliding.surfaces import steady_nodes
+from ..sliding.solution import steady_nodes
 from ..system import System
 
 

@@ -25,7 +25,7 @@ from ..laws.friction import Shared, own_law
 from ..modal.options import Options
 from ..notebook import Shown, counted
 from ..sliding import full_motion
-from ..sliding.surfaces import SurfaceSliding, steady_nodes
+from ..sliding.solution import SteadySliding, steady_nodes
 from ..system import System, build_system
 from ..system.model import AnswerCache
 from ..temporal.inputs import unfit_in_time
@@ -210,7 +210,7 @@ class Workspace(Shown):
             f"so that their ratios do not count here; {KEPT_BY}{along}",
         )
 
-    def steady(self, mu: float | None = None) -> SurfaceSliding:
+    def steady(self, mu: float | None = None) -> SteadySliding:
         """Steady sliding, node by node, at ``mu`` (None: with the laws' own coefficients)."""
         return steady_nodes(self.system(mu), mu)
 

@@ -10,7 +10,7 @@ from ..case import Case
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onsets
 from ..periodic import Cycles
-from ..sliding.surfaces import SurfaceSliding
+from ..sliding.solution import SteadySliding
 from ..study.measures import Countermeasures
 from ..study.saturation import Unsaturated
 from ..study.sensitivities import Sensitivities
@@ -70,7 +70,7 @@ class ReportInputs:
     case: Case
     system: System | None = None
     mu: float | None = None
-    steady: SurfaceSliding | None = None
+    steady: SteadySliding | None = None
     modes: ComplexModes | None = None
     undamped_sweep: ComplexModes | None = None
     damped_sweep: ComplexModes | None = None

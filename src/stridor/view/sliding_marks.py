@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..sliding.points import mean_direction
+from ..sliding.motions import mean_direction
 from ..typing import Array
 from .colours import GREY, INK
 from .interface_columns import seen_from_normal

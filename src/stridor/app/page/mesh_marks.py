@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from ...sliding.points import full_motion, mean_direction
+from ...sliding.motions import full_motion, mean_direction
 from ...system import System
 from ...typing import Array, IntArray, Sparse
 

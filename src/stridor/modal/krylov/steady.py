@@ -12,15 +12,15 @@ from ...contact.multipliers import SLIP, STICK
 from ...contact.nodes import ContactNodes
 from ...errors import AnalysisError, NotSlidingError
 from ...sliding import (
-    SurfaceSliding,
+    SteadySliding,
     friction_damping_matrix,
     full_motion,
     require_pressed,
     steady_nodes,
-    steady_sliding_nodes,
+    steady_sliding,
 )
+from ...sliding.solution import STILL
 from ...sliding.stick_slip import StickRows
-from ...sliding.surfaces import STILL
 from ...system import System
 from ...typing import Array, BoolArray, IntArray, Sparse
 from ..options import Options
@@ -214,12 +214,12 @@ class Steadiness:
             stiffness = change if stiffness is None else sp.csr_array(stiffness + change)
         return weakening, damping, stiffness
 
-    def _steady(self, mu: float) -> SurfaceSliding:
+    def _steady(self, mu: float) -> SteadySliding:
         """Steady sliding at ``mu``: with the nodes held where they are, else kept with the system, and sought from the
         nodes that touch here on."""
         held = self._held
         if held is not None:
-            return steady_sliding_nodes(self.system, mu=mu, held=held, solver=self.solver)
+            return steady_sliding(self.system, mu=mu, held=held, solver=self.solver)
         guess = np.zeros(self.nodes.count, dtype=bool)
         guess[self.touching] = True
         return steady_nodes(self.system, mu, self.solver, guess=guess)
@@ -233,7 +233,7 @@ class Steadiness:
         held[self.touching] = True
         return held
 
-    def _stretching(self, steady: SurfaceSliding) -> Sparse:
+    def _stretching(self, steady: SteadySliding) -> Sparse:
         """The stiffness 3 k₃ s² (n, n) of cubic springs that the steady state has stretched by s."""
         cubic = self.system.cubic
         assert cubic is not None, "asked for where there are some"

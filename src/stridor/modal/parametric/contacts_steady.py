@@ -17,7 +17,7 @@ from ...contact.nodes import ContactNodes
 from ...direct import SingularMatrix
 from ...errors import AnalysisError
 from ...sliding import full_motion
-from ...sliding.surfaces import STILL
+from ...sliding.solution import STILL
 from ...system import System
 from ...typing import Array, IntArray, Sparse
 from ..krylov.steady import Steadiness

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ....errors import AnalysisError, CaseError
-from ....sliding import slip_speeds, steady_sliding, steady_sliding_nodes
+from ....sliding import slip_speeds, steady_sliding
 from ....system import System
 from ....system.uncoupled import no_complete_basis
 from ....typing import Array
@@ -239,8 +239,7 @@ class ExactStepper:
             if stretch.ramp_steps:
                 ramp = stretch.ramp_steps * schedule.step
                 raise CaseError("phases.0.ramp", ramp, "0 when starting from steady sliding")
-            equilibrium = steady_sliding_nodes if system.surfaces else steady_sliding
-            found = equilibrium(
+            found = steady_sliding(
                 system.in_place(stretch.distances_after),
                 load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
                 motion_factors=stretch.velocities_after,

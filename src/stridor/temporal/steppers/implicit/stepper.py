@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from ....contact.nodes import ContactNodes
 from ....errors import AnalysisError, CaseError
-from ....sliding.surfaces import steady_sliding_nodes
+from ....sliding.solution import steady_sliding
 from ....system import System
 from ....typing import Array
 from ...beta2 import StepLimit, scheme
@@ -198,7 +198,7 @@ class ImplicitStepper:
         system, state, stretch = self._system, self.moving, schedule.stretches[0]
         if stretch.ramp_steps:
             raise CaseError("phases.0.ramp", stretch.ramp_steps * schedule.step, "0 when starting from steady sliding")
-        steady = steady_sliding_nodes(
+        steady = steady_sliding(
             system.in_place(stretch.distances_after),
             mu=mu,
             load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),

@@ -6,7 +6,7 @@ import numpy as np
 
 from ....contact.nodes import ContactNodes
 from ....errors import CaseError
-from ....sliding.surfaces import steady_sliding_nodes
+from ....sliding.solution import steady_sliding
 from ....system import System
 from ....typing import Array
 from ...schedule import Schedule
@@ -27,7 +27,7 @@ def begin(
     """Put a machine into its initial state.
 
     At rest: the bodies where and as fast as the system has them. Raises CaseError for a ramp out of steady sliding
-    and what `steady_sliding_nodes` raises.
+    and what `steady_sliding` raises.
     """
     system = machine.system
     u, v, a = np.zeros(system.size), np.zeros(system.size), np.zeros(system.size)
@@ -50,7 +50,7 @@ def _steady(machine: Machine, schedule: Schedule, settings: Settings, mu: float 
     system, stretch = machine.system, schedule.stretches[0]
     if stretch.ramp_steps:
         raise CaseError("phases.0.ramp", stretch.ramp_steps * schedule.step, "0 when starting from steady sliding")
-    steady = steady_sliding_nodes(
+    steady = steady_sliding(
         system.in_place(stretch.distances_after),
         mu=mu,
         load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),

@@ -1,6 +1,6 @@
-"""Steady sliding of any number of contact nodes, in the plane or in space, on sparse matrices.
+"""Steady sliding: the equilibrium that both approaches start from, of any number of contact nodes.
 
-K u − Σ (n + μ s·t) N = f − C_L v,   g₀ + n u + N/K_c = 0,   N ≥ 0
+K u − Σ (n + μ s·t) N = f − C_L v,   g₀ + n u + N/K_c = 0,   N ≥ 0   (paper 1.3, eqs 2–4)
 
 with s = −w/|w| the direction opposite to a node's slip velocity w, so that friction opposes the slip. Where a system
 has load steps, nodes that no motion slides stick or slip as these leave them (`stick_slip`).
@@ -8,7 +8,7 @@ has load steps, nodes that no motion slides stick or slip as these leave them (`
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,16 +23,18 @@ from ..notebook import Shown, counted, html_table
 from ..stages import passing, stage
 from ..system import System
 from ..typing import Array, BoolArray, IntArray, Sparse
-from .equilibrium import Equilibrium, NodeEquilibrium, find_touching, sets_near
+from .equilibrium import ContactRows, Equilibrium, NodeEquilibrium, find_touching, of_every_set, sets_near
 from .history import STILL, follow
+from .motions import external_force, full_motion, words_of_friction
 from .pattern import left_by_facets, unexplained_patterns
-from .points import external_force, full_motion, words_of_friction
 from .redundant import closed, nearly_one, redundant
 from .resultants import Balance, Resultant, balance, resultants
 
 ALL_TRIED = 5  # nodes of which it is looked whether other sets are in equilibrium as well
 PRESSED = 1e-12  # of the largest force on a freedom: contact forces no larger are rounding of it
+ROUNDING = 1e-14  # of the displacement that the largest contact force gives the stiffest freedom
 SIGN_CHANGES = 30
+MOST = 100_000  # unknowns of all sets of nodes that are tried where one of them does not hold the structure
 STEADY = "steady sliding of nodes"
 
 
@@ -61,7 +63,7 @@ class OtherEquilibrium:
 
 
 @dataclass(frozen=True, repr=False)
-class SurfaceSliding(Shown):
+class SteadySliding(Shown):
     """Equilibrium under friction of m contact nodes in d = 2 or 3 dimensions.
 
     displacement (n,) [m] relative to the moving supports. normal_force (m,) [N] in compression; friction_force
@@ -127,7 +129,7 @@ class SurfaceSliding(Shown):
 
 
 @passing()
-def steady_sliding_nodes(
+def steady_sliding(
     system: System,
     *,
     mu: float | None = None,
@@ -136,7 +138,7 @@ def steady_sliding_nodes(
     guess: BoolArray | None = None,
     held: BoolArray | None = None,
     solver: str | None = None,
-) -> SurfaceSliding:
+) -> SteadySliding:
     """Solve the steady sliding equilibrium of every contact, over points and over surfaces.
 
     mu replaces the friction coefficient of every contact; load_factors default to one for every load,
@@ -169,36 +171,35 @@ def steady_sliding_nodes(
     force = external_force(system, load_factors) - system.motion.damping @ factors
     rubs = bool(np.any(coefficient[:, None] * sense))
     symmetric = not rubs and system.symmetric_definite
-    sign, iterations = np.ones(nodes.count), 0
     stage("steady sliding" if mu is None else f"steady sliding at μ = {mu:.6g}")
-    for _ in range(SIGN_CHANGES):
-        # Friction is μ|N| against the slip: where a contact kept closed pulls, it goes with −N.
+
+    with np.errstate(over="ignore"):
+        beyond = float(coefficient.max(initial=0.0)) * float(np.abs(system.stiffness.data).max(initial=0.0)) ** 2
+    if not np.isfinite(beyond):
+        raise AnalysisError(
+            f"steady sliding has no equilibrium in numbers that a computer has at {words_of_friction(coefficient)}; "
+            "lower the friction coefficient"
+        )
+
+    def opposing(sign: Array) -> Equilibrium:
         rubbing = (sign * coefficient)[:, None] * sense
         push = sp.csr_array(nodes.normal + nodes.along(rubbing)) if rubs else nodes.normal
-        equilibrium = Equilibrium(system, nodes, push, force, symmetric=symmetric, solver=solver, rubbing=rubbing)
-        try:
-            state, tried = find_touching(equilibrium, guess) if held is None else (equilibrium.solve(held), 1)
-        except SingularMatrix as error:
-            raise AnalysisError(_loose(system, nodes, error.motion)) from error
-        except AnalysisError as error:
-            # Forces that no equation tells are rounding: which nodes seem to pull changes from step to step.
-            if twice := redundant(system, nodes, nodes.compliance == 0.0):
-                raise AnalysisError(twice) from error
-            raise
-        iterations += tried
-        found = np.where(nodes.kept & (state.normal_force < 0.0), -1.0, 1.0)
-        if not rubs or np.array_equal(found, sign):
-            break
-        sign = found
-    else:
-        hint = " or give them a finite stiffness" if np.any(nodes.compliance[nodes.kept] == 0.0) else ""
-        raise AnalysisError(
-            f"steady sliding: where contacts kept closed push and where they pull does not settle in {SIGN_CHANGES} "
-            f"steps; with so much friction there may be no equilibrium: lower the friction coefficient{hint}"
-        )
+        return Equilibrium(system, nodes, push, force, symmetric=symmetric, solver=solver, rubbing=rubbing)
+
+    try:
+        equilibrium, state, iterations = _settled(opposing, nodes, coefficient if rubs else None, guess, held)
+    except SingularMatrix as error:
+        raise AnalysisError(_loose(system, nodes, error.motion)) from error
+    except AnalysisError as error:
+        # Forces that no equation tells are rounding: which nodes seem to pull changes from step to step.
+        if twice := redundant(system, nodes, nodes.compliance == 0.0):
+            raise AnalysisError(twice) from error
+        raise
     residual = equilibrium.residual(state)
     _require_held(system, nodes, state, residual)
-    touches = closed(state.active, state.gap, state.displacement)
+    # Where nothing but rigid contact holds the structure, displacements are rounding of its forces.
+    rounding = ROUNDING * float(np.abs(state.normal_force).max(initial=0.0)) / equilibrium.scale
+    touches = closed(state.active, state.gap, state.displacement, rounding)
     rigid = nodes.compliance == 0.0
     if twice := nearly_one(system, touches, rigid) or redundant(system, nodes, touches & rigid):
         raise AnalysisError(twice)
@@ -219,10 +220,11 @@ def steady_sliding_nodes(
     # What pulls by rounding does not pull.
     own = nodes.kept if held is None else np.ones(nodes.count, dtype=bool)
     normal = np.where(own, state.normal_force, np.maximum(state.normal_force, 0.0))
-    friction = rubbing * normal[:, None]
+    sign = _signs(nodes, state)
+    friction = (sign * coefficient)[:, None] * sense * normal[:, None]
     if rubs:
         sense = sign[:, None] * sense
-    return SurfaceSliding(
+    return SteadySliding(
         displacement=state.displacement,
         normal_force=normal,
         friction_force=friction,
@@ -236,12 +238,55 @@ def steady_sliding_nodes(
         status=np.where(state.active, SLIP, OPEN),
         travel=np.zeros(len(factors)),
         resultants=resultants(nodes, normal, friction, state.active),
-        balance=balance(system, force, push.T @ state.normal_force),
+        balance=balance(system, force, equilibrium.push.T @ state.normal_force),
         warnings=tuple(unexplained_patterns(system, normal, state.gap, state.active)),
     )
 
 
-def other_equilibria(system: System, found: SurfaceSliding, mu: float | None = None) -> list[OtherEquilibrium]:
+def _settled(
+    opposing: Callable[[Array], Equilibrium], nodes: ContactNodes, friction: Array | None, guess: BoolArray | None,
+    held: BoolArray | None,
+) -> tuple[Equilibrium, NodeEquilibrium, int]:  # fmt: skip
+    """The equilibrium in which friction μ|N| opposes the slip, and how many sets of touching nodes were tried: where a
+    contact kept closed pulls, friction goes with −N, and ``opposing`` makes the equations of such signs (m,). friction:
+    the coefficients (m,), None where nothing rubs. Of few nodes every set and every sign is tried where the search
+    does not settle, or meets a set that has no equilibrium. Raises what `find_touching` does."""
+    sign, iterations = np.ones(nodes.count), 0
+    equilibrium = opposing(sign)
+    at = "" if friction is None else f" at {words_of_friction(friction)}"
+    try:
+        for _ in range(SIGN_CHANGES):
+            state, tried = find_touching(equilibrium, guess, at=at) if held is None else (equilibrium.solve(held), 1)
+            iterations += tried
+            found = _signs(nodes, state)
+            if friction is None or np.array_equal(found, sign):
+                return equilibrium, state, iterations
+            sign = found
+            equilibrium = opposing(sign)
+        hint = " or give them a finite stiffness" if np.any(nodes.compliance[nodes.kept] == 0.0) else ""
+        raise AnalysisError(
+            f"steady sliding{at}: where contacts kept closed push and where they pull does not settle in "
+            f"{SIGN_CHANGES} steps; with so much friction there may be no equilibrium: lower the friction "
+            f"coefficient{hint}"
+        )
+    except AnalysisError:
+        turning = np.flatnonzero(nodes.kept) if friction is not None else np.zeros(0, dtype=np.int64)
+        if held is not None or 2**nodes.count * len(equilibrium.force) > MOST:
+            raise
+        for turned in sets_near(np.zeros(nodes.count, dtype=bool), turning):
+            equilibrium = opposing(np.where(turned, -1.0, 1.0))
+            for state in of_every_set(equilibrium):
+                if friction is None or np.array_equal(_signs(nodes, state) < 0.0, turned):
+                    return equilibrium, state, iterations
+        raise
+
+
+def _signs(nodes: ContactNodes, state: NodeEquilibrium) -> Array:
+    """Of μ (m,): against the slip where nodes push, with it where those kept closed pull."""
+    return np.where(nodes.kept & (state.normal_force < 0.0), -1.0, 1.0)
+
+
+def other_equilibria(system: System, found: SteadySliding, mu: float | None = None) -> list[OtherEquilibrium]:
     """The other sets of touching nodes that are in equilibrium at the same friction, where all can be tried: of a few
     nodes, without load steps."""
     nodes = system.contact_nodes()
@@ -251,13 +296,13 @@ def other_equilibria(system: System, found: SurfaceSliding, mu: float | None = N
     return system.once(("other equilibria", mu), lambda: _others(system, found, mu, free))
 
 
-def _others(system: System, found: SurfaceSliding, mu: float | None, free: IntArray) -> list[OtherEquilibrium]:
+def _others(system: System, found: SteadySliding, mu: float | None, free: IntArray) -> list[OtherEquilibrium]:
     others, nodes = list[OtherEquilibrium](), system.contact_nodes()
     for active in sets_near(found.active, free):
         if np.array_equal(active, found.active):
             continue
         try:
-            held = steady_sliding_nodes(system, mu=mu, held=active)
+            held = steady_sliding(system, mu=mu, held=active)
         except AnalysisError:
             continue
         force, gap, own = held.normal_force[free], held.gap[free], active[free]
@@ -271,13 +316,13 @@ def _others(system: System, found: SurfaceSliding, mu: float | None, free: IntAr
 
 def steady_nodes(
     system: System, mu: float | None = None, solver: str | None = None, *, guess: BoolArray | None = None
-) -> SurfaceSliding:
-    """`steady_sliding_nodes` under all loads and motions, solved once for each μ and kept with the system; guess: where
+) -> SteadySliding:
+    """`steady_sliding` under all loads and motions, solved once for each μ and kept with the system; guess: where
     it begins if it is not known."""
-    return system.once((STEADY, mu, solver), lambda: steady_sliding_nodes(system, mu=mu, guess=guess, solver=solver))
+    return system.once((STEADY, mu, solver), lambda: steady_sliding(system, mu=mu, guess=guess, solver=solver))
 
 
-def _after_load_steps(system: System, mu: float | None, solver: str | None) -> SurfaceSliding:
+def _after_load_steps(system: System, mu: float | None, solver: str | None) -> SteadySliding:
     nodes = system.contact_nodes()
     last = system.load_steps[-1]
     if last.duration is None:
@@ -292,7 +337,7 @@ def _after_load_steps(system: System, mu: float | None, solver: str | None) -> S
             "of the loads"
         )
     force = nodes.normal.T @ state.normal_force + nodes.tangent.T @ state.friction.ravel()
-    return SurfaceSliding(
+    return SteadySliding(
         displacement=state.displacement,
         normal_force=np.maximum(state.normal_force, 0.0),
         friction_force=state.friction,
@@ -333,12 +378,29 @@ def _require_last(system: System, load_factors: Mapping[str, float] | None, moti
         )
 
 
-def touching(system: System, steady: SurfaceSliding) -> ContactNodes:
+def force_rates(system: System, steady: SteadySliding, solver: str | None = None) -> Array:
+    """dN/dμ (m,) [N] of the normal forces, with the nodes held that touch and every μ_i growing by its share:
+
+    K u' − (n + μ s·t)ᵀ N' = (s·t)ᵀ N,    n u' + c N' = 0,
+
+    the derivative of the equations of steady sliding. Without springs and contact beyond the linear. Raises
+    direct.SingularMatrix where the equilibrium is the last of its branch.
+    """
+    system = system.in_place()
+    nodes = system.contact_nodes()
+    push = sp.csr_array(nodes.normal + nodes.along(steady.friction_coefficient[:, None] * steady.sense))
+    force = nodes.along(nodes.share[:, None] * steady.sense).T @ steady.normal_force
+    rows = ContactRows(nodes.normal, np.zeros(nodes.count), nodes.compliance, np.zeros(nodes.count), nodes.kept)
+    change = Equilibrium(system, rows, push, force, symmetric=False, solver=solver).solve(steady.active)
+    return change.normal_force
+
+
+def touching(system: System, steady: SteadySliding) -> ContactNodes:
     """The contact nodes that carry load, in the order of the system's."""
     return system.contact_nodes().select(steady.active)
 
 
-def friction_damping_matrix(system: System, steady: SurfaceSliding, *, slope: bool = True) -> Sparse:
+def friction_damping_matrix(system: System, steady: SteadySliding, *, slope: bool = True) -> Sparse:
     """Damping (n, n) csr [N s/m] that friction adds to small motions about steady sliding.
 
     Friction keeps opposing the slip as its direction turns, which damps motion across it with μ N/|w| (in space
