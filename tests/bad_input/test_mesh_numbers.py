@@ -264,6 +264,28 @@ def test_binary_files(form, number, tmp_path):
     assert f"uses node {number + 1}, which is not defined" in told(path, path.read_bytes())
 
 
+@pytest.mark.parametrize("numbers", [[2, 3, 4, 5], [1, 2, 4, 3], [1, 2, 3, 9]])
+def test_binary_files_of_format_2_2_need_their_nodes_in_order(numbers, tmp_path):
+    path = tmp_path / "a.msh"
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    meshio.Mesh(points, [("triangle", np.array([[0, 1, 2], [0, 2, 3]]))]).write(path, file_format="gmsh22", binary=True)
+    data = bytearray(path.read_bytes())
+    record = np.dtype([("number", "i4"), ("place", "f8", (3,))])
+    at = data.index(b"\n", data.index(b"$Nodes\n") + len(b"$Nodes\n")) + 1
+    nodes = np.frombuffer(bytes(data[at : at + 4 * record.itemsize]), record).copy()
+    assert nodes["number"].tolist() == [1, 2, 3, 4]
+    nodes["number"] = numbers
+    data[at : at + 4 * record.itemsize] = nodes.tobytes()
+    first = data.index(b"\n", data.index(b"$Elements\n") + len(b"$Elements\n")) + 1 + 12  # behind the block's head
+    end = data.index(b"$EndElements") - 1
+    rows = np.frombuffer(bytes(data[first:end]), "i4").reshape(2, -1).copy()
+    rows[:, -3:] = np.array(numbers)[rows[:, -3:] - 1]
+    data[first:end] = rows.tobytes()
+    message = told(path, bytes(data))
+    assert "is binary, of format 2.2, and its 4 nodes are not numbered from 1 to 4 in this order" in message
+    assert message.endswith("renumber them in Gmsh, or save it as format 4.1 or as text (ASCII)")
+
+
 def test_format_4_0_is_not_guessed_at(tmp_path):
     message = told(tmp_path / "a.msh", NEW.replace("4.1 0 8", "4.0 0 8"))
     assert "is of Gmsh's format 4.0; save it from Gmsh as 4.1 or 2.2" in message

@@ -204,6 +204,16 @@ def test_files_of_noise(folder: Path, name: str) -> None:
     assert found.startswith(f"bodies.slider.file: '{shown_path(folder / name)}' – {NOISE[name]}")
 
 
+def test_a_reader_that_gives_no_reason(folder: Path) -> None:
+    head = '<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian"><UnstructuredGrid/>'
+    (folder / "a.vtu").write_text(f'{head}<AppendedData encoding="base64">x</AppendedData></VTKFile>')
+    (found,) = told(lambda: case_of(folder, "a.vtu"))
+    assert found.endswith(
+        "is not readable as a VTK XML unstructured grid: its reader gives no reason; it is cut short or damaged, or of a "
+        "kind that is not read"
+    )
+
+
 def test_an_input_file_of_noise(folder: Path) -> None:
     (folder / "a.inp").write_bytes(np.random.default_rng(0).integers(0, 256, 2000, dtype=np.uint8).tobytes())
     assert told(lambda: case_of(folder, "a.inp")) == ["a.inp: cannot be read: not a text file"]

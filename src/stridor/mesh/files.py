@@ -94,8 +94,8 @@ def _through_meshio(file: Path, suffix: str, where: str) -> Any:
         elif isinstance(error, IndexError | ValueError) and not isinstance(error, UnicodeError):
             # What Python says of a list that is too short is nothing that a user could mend.
             reason = f"it breaks off, or holds something else where numbers should be ({reason})"
-        text = f"is not readable as {_LOOKS[suffix]}"
-        raise CaseError(where, shown_path(file), f"{text}: {reason}" if reason else text) from error
+        reason = reason or "its reader gives no reason; it is cut short or damaged, or of a kind that is not read"
+        raise CaseError(where, shown_path(file), f"is not readable as {_LOOKS[suffix]}: {reason}") from error
 
 
 def _dimension(kind: str) -> int:

@@ -34,8 +34,9 @@ _MEND = "correct the number or the lines, or save the file from Gmsh again"
 
 def check_numbers(file: Path, where: str) -> None:
     """Raise CaseError for nodes numbered below 1, twice or absurdly high, for elements with a node that is not there,
-    and for more or fewer of them than the file says: at "FILE, line N" for text, at ``where`` for binary files. What is
-    broken otherwise is left to the reader."""
+    and for more or fewer of them than the file says: at "FILE, line N" for text, at ``where`` for binary files; in
+    binary files of format 2.2 for nodes in another order than 1, 2, …. What is broken otherwise is left to the
+    reader."""
     data = file.read_bytes()
     sections = {found[1]: found.end() for found in reversed(list(_SECTION.finditer(data)))}
     if not {b"MeshFormat", b"Nodes", b"Elements"} <= set(sections):
@@ -200,6 +201,11 @@ def _check_binary(file: Path, where: str, data: bytes, sections: dict[bytes, int
             if np.any(wrong):
                 text = f"has an element that uses node {block[wrong][0]}, which is not defined"
                 break
+        if not text and old and not np.array_equal(nodes, np.arange(1, len(nodes) + 1)):
+            text = (
+                f"is binary, of format 2.2, and its {len(nodes)} nodes are not numbered from 1 to {len(nodes)} in this "
+                "order, as its reader needs them; renumber them in Gmsh, or save it as format 4.1 or as text (ASCII)"
+            )
     if text:
         raise CaseError(where, shown_path(file), text)
 
