@@ -6,6 +6,7 @@ import contextlib
 import csv
 import functools
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ import scipy.sparse as sp
 import stridor as st
 from matrix_cases import matrix_case
 from program import stridor
-from rubbing_block import rubbing_block
+from rubbing_block import RUBBING_MASS, rubbing_block
 from stridor.case import template_text
 from stridor.io import matrix_files
 from stridor.io.matrix_files import FORMATS, Format, write_matrices
@@ -147,6 +148,13 @@ def test_what_is_no_straight_line_over_friction_is_exported_at_one_friction_only
     own = np.sort(st.modes(case, 0.2).growth_rate[0])[-3:]
     found = np.sort(st.modes(st.load(at.case)).growth_rate[0])[-3:]
     assert found == pytest.approx(own, rel=1e-8)
+
+
+def test_what_is_no_straight_line_is_named(tmp_path: Path) -> None:
+    law = '{ law = "coulomb", coefficient = 0.3 }\ncontacts.rub.cubic = 2.0'
+    case = st.loads(re.sub(r"(rub\.friction = ).*", rf"\1{law}", RUBBING_MASS))
+    (note,) = st.export(case, tmp_path).notes
+    assert "what steady sliding adds (contact stiffness with a cubic term) is no straight line over mu" in note
 
 
 def test_a_note_where_other_nodes_touch_at_another_friction(tmp_path: Path) -> None:

@@ -19,7 +19,6 @@ import scipy.sparse as sp
 from ..errors import AnalysisError, CaseError
 from ..matrices.model import Role
 from ..modal.krylov.problem import ContactProblem, problem_of
-from ..modal.options import Options
 from ..sliding import full_motion
 from ..system import System
 from ..typing import Array, IntArray, Sparse
@@ -142,7 +141,7 @@ def _over_friction(
         ExportedTerm("C", system.damping, "damping"),
         ExportedTerm("K", system.stiffness, "stiffness"),
     )
-    why = _bent(system, contact, work.options)
+    why = _bent(system, contact)
     if why:
         note = f"Kc and Kf, what contacts and friction add, are left out: {why}; export at one mu instead (--mu)"
         return own, False, (note,)
@@ -177,12 +176,10 @@ def _wider(matrix: Sparse, more: int) -> Sparse:
     return sp.csr_array(sp.block_diag([matrix, sp.csr_array((more, more))], format="csr")) if more else matrix
 
 
-def _bent(system: System, contact: ContactProblem, options: Options) -> str:
+def _bent(system: System, contact: ContactProblem) -> str:
     """Why K and C are no straight line over μ, "" where they are."""
     if contact.extras is not None:
-        asked = {"modal.friction_damping": options.friction_damping, "modal.prestress": options.prestress}
-        by = ", ".join(name for name, is_asked in asked.items() if is_asked) or "friction that changes with speed"
-        return f"what steady sliding adds ({by}) is no straight line over mu"
+        return f"what steady sliding adds ({', '.join(contact.extras.reasons)}) is no straight line over mu"
     if any(system.contact_cubic.values()):
         return f"the stiffness of {', '.join(system.contact_cubic)} depends on its force, and so on mu (cubic)"
     return ""

@@ -192,6 +192,11 @@ class Varying:
         """Whether nothing is added without friction."""
         return self._state.rests
 
+    @property
+    def reasons(self) -> list[str]:
+        """What of the steady state adds terms, in words."""
+        return self._state.reasons
+
     def __call__(self, mu: float) -> Extras:
         """The terms at ``mu``."""
         if mu == 0.0 and self.rests:

@@ -164,7 +164,7 @@ class Steadiness:
     def reasons(self) -> list[str]:
         """What of the steady state adds terms, in words."""
         found = {
-            "the slope of a friction law": self.sloped,
+            "friction that changes with speed": self.sloped,
             "friction damping": self.friction_damping,
             "prestress": self.prestress,
             "contact stiffness with a cubic term": self.hardens,
