@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -33,6 +35,20 @@ def test_onsets_are_drawn_where_growth_begins_and_where_it_ends(case: st.Case) -
     assert len(at_end) > 0
     texts = [text.get_text() for text in figure.axes[0].texts]
     assert texts == [f"{o.mu:.4f}" for o in found]
+
+
+def test_the_legend_of_all_that_can_be_drawn_stays_in_the_picture(case: st.Case) -> None:
+    found = st.onsets(case, (0.0, 1.0), max_frequency_hz=20e3)
+    onset = next(iter(found))
+    both = (replace(onset, stabilising=False), replace(onset, stabilising=True))
+    figure = onset_chart(replace(found, onsets=both, at_start=found.at_end))
+    figure.draw_without_rendering()
+    legend = figure.axes[0].get_legend()
+    assert legend is not None
+    assert len(legend.get_texts()) == 4
+    box = legend.get_window_extent()
+    assert 0.0 <= box.x0 < box.x1 <= figure.bbox.x1
+    assert figure.axes[0].get_window_extent().x1 > 0.95 * figure.bbox.x1  # nor does it narrow the frame
 
 
 def test_a_range_without_onsets_says_so(case: st.Case) -> None:

@@ -49,7 +49,8 @@ def onset_chart(onsets: Onsets | ParametricOnsets, *, ax: Axes | None = None) ->
     ax.set(xlim=(low, high), ylim=(0, onsets.max_frequency_hz / 1e3), xlabel=name, ylabel="frequency [kHz]")
     if not len(onsets):
         ax.text(0.5, 0.5, "no onset found", transform=ax.transAxes, ha="center", va="center", color=GREY)
-    legend_above(ax)
+    # Four that long do not stand beside each other, and what is too wide takes its width from the frame.
+    legend_above(ax, columns=4 if len(ax.get_legend_handles_labels()[1]) < 4 else 2)
     return figure
 
 
