@@ -1184,3 +1184,19 @@ def test_a_point_is_paired_with_the_line_below_it(side: int) -> None:
         assert found.compliance == 0.0
     assert paired([-0.01, 0.0]) is None
     assert paired([1.45, 0.2]) is None
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_point_on_a_circle_overlaps_by_rounding_only(inside: bool) -> None:
+    """A lone point at the origin has neither extent nor coordinates; the centre and the radius round all the same."""
+    origin, rng = np.zeros((1, 2)), np.random.default_rng(4)
+    overlaps = 0
+    for _ in range(50):
+        radius, angle = 10.0 ** rng.uniform(-3, 3), rng.uniform(0, 2 * np.pi)
+        obstacle = Cylinder(radius * np.array([np.cos(angle), np.sin(angle)]), radius, inside=inside)
+        location = obstacle.locate(origin)
+        allowed = pairing.overlap_tolerance(origin, -location.normal, obstacle)
+        overlaps += bool(location.gap[0] < 0.0)
+        assert location.gap[0] >= -allowed
+        assert allowed <= 1e-11 * radius
+    assert overlaps > 0

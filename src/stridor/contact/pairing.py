@@ -249,7 +249,7 @@ def overlap_tolerance(position: Array, normals: Array, master: MasterSurface) ->
     position (m, d), normals (m, d): the slave nodes, whose chords are taken between nearest neighbours.
     """
     rounding = 1e-9 * float(np.linalg.norm(np.ptp(position, axis=0)))
-    rounding += 1e-12 * float(np.abs(position).max(initial=0.0))
+    rounding += 1e-12 * max(float(np.max(np.abs(numbers), initial=0.0)) for numbers in (position, *_placing(master)))
     height = float(getattr(master, "chord_height", 0.0))
     count = min(len(position), 2 * position.shape[1] - 1)
     if count > 1:
@@ -260,6 +260,12 @@ def overlap_tolerance(position: Array, normals: Array, master: MasterSurface) ->
         heights = np.abs(np.sum(change * (position[near] - position[:, None]), axis=2)) / 8.0
         height += float(np.where(smooth, heights, 0.0).max())
     return 1.5 * height + rounding
+
+
+def _placing(master: MasterSurface) -> list[Array]:
+    """Numbers [m] that say where a surface is, by whose rounding gaps are wrong: a point on a circle need not have any
+    itself."""
+    return [np.asarray(getattr(master, name, 0.0)) for name in ("positions", "point", "centre", "radius")]
 
 
 def _never_touching(position: Array, location: Location, opposed: BoolArray, reach: float | None) -> str:
