@@ -109,7 +109,7 @@ def test_contact_multipliers_without_friction_are_noticed():
 @pytest.mark.parametrize(("form", "words"), [("symmetric", "as one half of a symmetric"), ("general", "is stored as not symmetric")])
 def test_what_the_file_says_of_itself(form, words):
     stiffness = chain(3, 1.0)
-    stored = StoredMatrix(stiffness, "a.mtx", role="stiffness", form=form)
+    stored = StoredMatrix(stiffness, "a.mtx", role="stiffness", form=form, program="Abaqus")
     found = report(sp.csr_array(np.eye(3)), None, stiffness, stored=[stored])
     assert words in found.warnings[0]
     assert "UNSYMM=YES" in found.warnings[0]
@@ -118,6 +118,21 @@ def test_what_the_file_says_of_itself(form, words):
     internal = Labels(np.array([1, 2, -1]), np.array([1, 1, 1]))
     found = report(sp.csr_array(np.eye(3)), None, stiffness, labels=internal)
     assert found.warnings[0].startswith("friction terms seem lost: 1 freedom is internal, as contact makes them,")
+
+
+@pytest.mark.parametrize(("form", "by"), [("symmetric", "its file says so"), ("general", "up to rounding")])
+def test_abaqus_is_named_for_files_of_abaqus_only(form, by):
+    stiffness = chain(3, 1.0)
+    stored = StoredMatrix(stiffness, "a.mtx", role="stiffness", form=form)
+    said = report(sp.csr_array(np.eye(3)), None, stiffness, stored=[stored]).warnings
+    assert said == (
+        f"no friction is in K: K is symmetric, {by}, and without friction terms no modes can couple to flutter",
+    )
+    # What looks like contacts of another program has lost something all the same.
+    internal = Labels(np.array([1, 2, -1]), np.array([1, 1, 1]))
+    (said,) = report(sp.csr_array(np.eye(3)), None, stiffness, labels=internal, stored=[stored]).warnings
+    assert said.startswith("friction terms seem lost: ")
+    assert "Abaqus" not in said
 
 
 def test_negative_masses_are_counted():

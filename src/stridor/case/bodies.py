@@ -296,6 +296,11 @@ class MatrixTerm(Table):
     factor: Number | Label = Field(
         default=1.0, description='a number, or an expression of [parameters] and mu such as "Omega**2 - 1"'
     )
+    one_sided: bool = Field(
+        default=False,
+        description="true or false, whether entries on one side of the diagonal only are meant so, and are no half of "
+        "a symmetric matrix",
+    )
 
 
 class MatrixBody(Table):
@@ -306,7 +311,7 @@ class MatrixBody(Table):
 
     type: Literal["matrices"]
     terms: tuple[MatrixTerm, ...] = Field(
-        description="a list of tables { file, name, role, factor }, at least one"
+        description="a list of tables { file, name, role, factor, one_sided }, at least one"
     )
     labels: Label | None = Field(
         default=None,

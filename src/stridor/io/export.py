@@ -14,6 +14,7 @@ from typing import Any
 from ..asking import PATH, SWITCH, takes
 from ..case import loads
 from ..errors import CaseError
+from ..matrices.entries import lone
 from ..notebook import Shown, html_table
 from ..study.exported import ExportedModel, exported_model
 from ..study.workspace import Problem, Workspace
@@ -205,8 +206,17 @@ def _case(work: Workspace, model: ExportedModel, form: Format) -> str:
         name = f"name = {_quoted(term.name if form == 'mat' else term.name.upper())}, " if form in HOLDS_ALL else ""
         factor = f', factor = "{term.factor}"' if isinstance(term.factor, str) else ""
         file = _quoted(file_of(term.name, form))
-        lines.append(f'  {{ file = {file}, {name}role = "{term.role}"{factor} }},    # {_meaning(term.name, model)}')
+        meant = ", one_sided = true" if _is_one_sided(term.matrix) else ""
+        what = f'{name}role = "{term.role}"{factor}{meant}'
+        lines.append(f"  {{ file = {file}, {what} }},    # {_meaning(term.name, model)}")
     return "\n".join([*lines, "]"]) + "\n"
+
+
+def _is_one_sided(matrix: Sparse) -> bool:
+    """Whether it looks like one half of a matrix to who reads it, as friction between few freedoms may."""
+    held = matrix.copy()
+    held.eliminate_zeros()
+    return lone(held) is not None
 
 
 def _quoted(text: str) -> str:

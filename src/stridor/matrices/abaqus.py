@@ -21,7 +21,7 @@ from .checks import chosen_in_any_case, nameless
 from .entries import assembled, check_symmetric, mirrored, sides
 from .model import Labels, Role, StoredMatrix
 from .numbers import fortran_number
-from .source import MatrixFile, counted, printable, source_at, unended
+from .source import Doubt, MatrixFile, counted, printable, source_at, unended
 
 # Where *BOUNDARY holds a freedom Abaqus writes 1e36 on the diagonal of the stiffness. A factor may have made that
 # smaller, but no stiffness is as large as this.
@@ -84,7 +84,15 @@ def read(path: Path, name: str | None, where: str) -> StoredMatrix:
     if held:
         many = counted(held, "freedom has", "freedoms have")
         notes += (f"{many} 1e36 on the diagonal: Abaqus' mark of *BOUNDARY; they are held.",)
-    return StoredMatrix(matrix, path.name, labels, role, form, section.name or None, notes + unended(data))
+    return StoredMatrix(
+        matrix, path.name, labels, role, form, section.name or None, notes + unended(data), "Abaqus",
+        _type(section) == "UNSYMMETRIC",
+    )  # fmt: skip
+
+
+def _type(section: _Section) -> str | None:
+    """What the header says of symmetry, None where there is no header."""
+    return None if section.options is None else section.options.get("TYPE", "SYMMETRIC").upper()
 
 
 def _role(source: MatrixFile) -> Role | None:
@@ -160,7 +168,7 @@ def _formed(
 ) -> tuple[Sparse, Literal["symmetric", "general"], tuple[str, ...]]:
     """The whole matrix, whether it is "symmetric" or "general", and notes: as its header says, else as its entries
     show."""
-    given = None if section.options is None else section.options.get("TYPE", "SYMMETRIC").upper()
+    given = _type(section)
     if given not in (None, "SYMMETRIC", "UNSYMMETRIC"):
         source.refuse(f"TYPE={given} is not known; accepted: SYMMETRIC, UNSYMMETRIC")
     both, alone = sides(matrix)
@@ -173,9 +181,11 @@ def _formed(
         note = (
             "No entry has a counterpart across the diagonal: taken as one half of a symmetric matrix and completed."
             if _one_triangle(rows, columns)
-            else "Entries stand on both sides of the diagonal, but none has a counterpart: taken as half of a "
-            "symmetric matrix and completed. If it is not symmetric, put *MATRIX INPUT, NAME=A, TYPE=UNSYMMETRIC "
-            "before its lines."
+            else Doubt(
+                "Entries stand on both sides of the diagonal, but none has a counterpart: taken as half of a "
+                "symmetric matrix and completed. If it is not symmetric, put *MATRIX INPUT, NAME=A, TYPE=UNSYMMETRIC "
+                "before its lines."
+            )
         )
     return mirrored(matrix), "symmetric", ((note,) if note else ())
 

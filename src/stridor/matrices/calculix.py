@@ -44,10 +44,11 @@ def read(path: Path, name: str | None, where: str) -> StoredMatrix:
     below, above = bool(np.any(row > column)), bool(np.any(row < column))
     if below and above:
         matrix, more = assembled(source, row, column, table[:, 2], (size, size))
-        return StoredMatrix(matrix, path.name, labels, role, "general", notes=notes + more)
+        return StoredMatrix(matrix, path.name, labels, role, "general", notes=notes + more, program="CalculiX")
     matrix, more = from_half(source, row, column, table[:, 2], (size, size))
     half = (_HALF,) if role != "mass" and (below or above) else ()
-    return StoredMatrix(matrix, path.name, labels, role, "symmetric", notes=notes + half + more)
+    notes += half + more
+    return StoredMatrix(matrix, path.name, labels, role, "symmetric", notes=notes, program="CalculiX")
 
 
 def _labels(source: MatrixFile, size: int) -> tuple[Labels | None, int, tuple[str, ...]]:

@@ -9,10 +9,11 @@ import scipy.sparse as sp
 
 from ..typing import Array, IntArray, Sparse
 from .checks import check_indices, check_size, real_part, real_values, square
-from .source import MatrixFile
+from .source import Doubt, MatrixFile
 
 # Halves that a program prints twice differ by rounding at most.
 _SAME = 1e-9
+_FEW = 100
 _BLOCK = 1 << 22  # values of a full matrix that are looked at together
 
 
@@ -38,7 +39,7 @@ def assembled(
     if not np.all(np.isfinite(matrix.data)):
         source.refuse("entries of the same place add up to more than a double precision number can hold")
     twice = len(real) - matrix.nnz
-    noted = f"Added up: {twice} of {len(real)} entries stand at a place that an earlier one has taken."
+    noted = Doubt(f"Added up: {twice} of {len(real)} entries stand at a place that an earlier one has taken.")
     return matrix, ((noted,) if twice else ())
 
 
@@ -103,6 +104,29 @@ def sides(matrix: Sparse) -> tuple[int, int]:
     pattern = _pattern(matrix)
     both = int(pattern.multiply(sp.csr_array(pattern.T)).nnz)
     return both, int(pattern.nnz) - both
+
+
+def lone(matrix: Sparse) -> tuple[int, int] | None:
+    """How many entries A (n, n) csr, without zeros, has below and above its diagonal if none of them has a counterpart
+    across it, as of a half of a symmetric matrix in any order of the freedoms; None if some have, or there are none."""
+    coo = matrix.tocoo()
+    off = coo.row != coo.col
+    row, column = coo.row[off], coo.col[off]
+    if not len(row):
+        return None
+    # The first few tell of almost every matrix that is whole, and the transpose of a large one takes its time.
+    if np.any(matrix[column[:_FEW], row[:_FEW]]):
+        return None
+    below = int(np.count_nonzero(row > column))
+    above = len(row) - below
+    return (below, above) if not (below and above and sides(matrix)[0]) else None
+
+
+def couples_apart(matrix: Sparse) -> bool:
+    """Whether A (n, n) has no diagonal and takes forces of some freedoms from others that get none, as friction that
+    the normal freedoms of contacts give to the tangential ones."""
+    coo = matrix.tocoo()
+    return not np.intersect1d(coo.row, coo.col).size
 
 
 def check_symmetric(source: MatrixFile, matrix: Sparse, *, stored_only: bool, says: str, instead: str) -> None:

@@ -25,7 +25,10 @@ class StoredMatrix:
 
     labels: names of the freedoms, None where the file gives none. role and form: what the file itself says, None where
     it says nothing; a matrix stored as "symmetric" has been completed from its half. name: that of the matrix in the
-    file. notes: what the user should know, one sentence each.
+    file. notes: what the user should know, one sentence each; those that are a `Doubt` may have changed numbers.
+    program: "Abaqus" or "CalculiX" where only that program writes such a file. declared: whether the file says in so
+    many words that the matrix is not symmetric, as other formats do of whatever they hold. lone: how many entries are
+    below and above the diagonal where none of them has a counterpart across it, as of a half; None where some have.
     """
 
     matrix: Sparse
@@ -35,3 +38,6 @@ class StoredMatrix:
     form: Literal["symmetric", "general"] | None = None
     name: str | None = None
     notes: tuple[str, ...] = ()
+    program: Literal["Abaqus", "CalculiX"] | None = None
+    declared: bool = False
+    lone: tuple[int, int] | None = None

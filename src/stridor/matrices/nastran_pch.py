@@ -19,7 +19,7 @@ from .entries import assembled, check_symmetric, mirrored, sides
 from .model import Labels, StoredMatrix
 from .nastran import LARGEST_GRID, REAL, SYMMETRIC, check_form, named
 from .numbers import fortran_number, whole_number
-from .source import MatrixFile, printable, source_at, unended
+from .source import Doubt, MatrixFile, printable, source_at, unended
 
 _FIRST_ENTRY = 4  # name, grid and component of the column, nothing
 _ACCEPTED = (1, SYMMETRIC)
@@ -89,7 +89,7 @@ def _stored(source: MatrixFile, found: _Matrix, notes: tuple[str, ...]) -> Store
         both, alone = sides(matrix)
         check_symmetric(source, matrix, stored_only=True, says="form 6 (symmetric)", instead="form 1 (square)")
         if both and alone:
-            note = f"{both} entries stand on both sides of the diagonal, {alone} on one; these were mirrored."
+            note = Doubt(f"{both} entries stand on both sides of the diagonal, {alone} on one; these were mirrored.")
             notes = (*notes, note)
         matrix = mirrored(matrix)
     return named(source, matrix, Labels(held // 8, held % 8), found.form, found.kind, notes)

@@ -22,7 +22,7 @@ from ..typing import IntArray, Sparse
 from .checks import chosen, expanded, nameless, square, whole_numbers
 from .entries import assembled, from_dense
 from .model import StoredMatrix
-from .source import MatrixFile, source_at
+from .source import Doubt, MatrixFile, source_at
 
 _NEEDED = {
     "csr": ("indices", "indptr"),
@@ -152,7 +152,7 @@ def _sparse(source: MatrixFile, arrays: Mapping[str, Any]) -> tuple[Sparse, tupl
     elif "indptr" not in arrays:
         form = "coo" if "row" in arrays else "dia"
     else:
-        notes = ("The file does not say whether indptr counts rows or columns; taken by rows (csr).",)
+        notes = (Doubt("The file does not say whether indptr counts rows or columns; taken by rows (csr)."),)
     if form not in _NEEDED:
         source.refuse(f"is a sparse matrix of format {form!r}; must be one of: {', '.join(_NEEDED)}")
     missing = [key for key in _NEEDED[form] if key not in arrays]

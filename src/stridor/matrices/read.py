@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from ..errors import CaseError
 from ..reading import bounded
 from ..typing import IntArray, Sparse
+from .entries import lone
 from .model import Labels, StoredMatrix
 from .numbers import fortran_number
 from .source import MatrixFile, source_at
@@ -55,7 +56,7 @@ def read_matrix(path: str | Path, name: str | None = None, *, where: str = "matr
     matrix = sp.csr_array(stored.matrix, dtype=np.float64)
     matrix.eliminate_zeros()
     matrix.sort_indices()
-    return replace(stored, matrix=matrix)
+    return replace(stored, matrix=matrix, lone=None if stored.form == "symmetric" else lone(matrix))
 
 
 def _module(source: MatrixFile) -> str:

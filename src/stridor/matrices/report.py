@@ -30,6 +30,8 @@ Definiteness = Literal["zero", "positive definite", "positive semidefinite", "in
 # Differences of mirrored entries below this, relative to the smaller of their rows' largest entries, are rounding.
 ROUNDING = 1e-12
 DENSE = 2000
+# What warnings of friction that a stiffness does not hold begin with.
+LOST, NO_FRICTION = "friction terms seem lost", "no friction is in K"
 _SHIFT = 1e-10
 # Young's modulus times speed of sound of steel, in Pa·m/s and in MPa·mm/s: what K ω of an element is about.
 _STEEL_SI, _STEEL_MM = 1e15, 1e12
@@ -103,13 +105,15 @@ def report(
     stiffness_terms: Sequence[Sparse] = (),
     contacts: Sequence[str] = (),
     supports: Sequence[str] = (),
+    doubts: Sequence[str] = (),
 ) -> MatrixReport:
     """Looks through mass, damping and stiffness, each (n, n); no damping is zero damping.
 
     labels: of the n freedoms. stored: the files the matrices are from, for what these say of themselves.
     stiffness_terms: (n, n) each, what adds up to the stiffness, where that is known. contacts: names of those that are
-    made beside the matrices, whose friction these need not hold; supports: of what holds the body beside them. Raises
-    CaseError at "matrices.ROLE" for a matrix that is not square, of another size, or has entries that are not finite.
+    made beside the matrices, whose friction these need not hold; supports: of what holds the body beside them.
+    doubts: what was found doubtful in reading, said first among the warnings. Raises CaseError at "matrices.ROLE" for a
+    matrix that is not square, of another size, or has entries that are not finite.
     """
     size = int(stiffness.shape[0])
     parts = {"mass": mass, "damping": damping, "stiffness": stiffness}
@@ -163,7 +167,8 @@ def report(
         warnings=(),
     )
     internal = 0 if kept is None else int(np.sum(kept.node < 0))
-    return replace(found, warnings=tuple(_warnings(found, internal, stored, whole, contacts, supports)))
+    said = _warnings(found, internal, stored, whole, contacts, supports)
+    return replace(found, warnings=(*doubts, *said))
 
 
 def single_lines(stored: StoredMatrix) -> list[str]:
@@ -183,6 +188,10 @@ def single_lines(stored: StoredMatrix) -> list[str]:
     rank, exact, coupled = _coupling([matrix])
     if rank:
         lines.append(f"A − Aᵀ has rank {'' if exact else 'at most '}{rank}, in {counted(coupled, 'row', 'rows')}")
+    if stored.lone is not None:
+        below, above = stored.lone
+        many = f"{below} entries below the diagonal, {above} above, and none has a counterpart across it"
+        lines.append(f"{many}: is it one half of a matrix?")
     return [*lines, *(f"read: {note}" for note in stored.notes)]
 
 
@@ -432,16 +441,21 @@ def _friction(
         return []
     of_k = [s for s in stored if s.role == "stiffness"]
     mend = "in Abaqus, ask for *STEP, UNSYMM=YES and a sliding contact with friction before *MATRIX GENERATE"
-    if any(s.source.lower().endswith(".sti") for s in of_k):
+    if any(s.program == "CalculiX" or s.source.lower().endswith(".sti") for s in of_k):
         mend = "CalculiX stores one half only, whatever friction does; take the matrix from another program"
+    elif of_k and not any(s.program == "Abaqus" for s in of_k):
+        mend = "ask the program that wrote it for the matrix of sliding contact with friction, not symmetric"
+        if not made and any(s.form for s in of_k):  # by hand, or by a program that knows nothing of contacts
+            by = "its file says so" if any(s.form == "symmetric" for s in of_k) else "up to rounding"
+            return [f"{NO_FRICTION}: K is symmetric, {by}, and without friction terms no modes can couple to flutter"]
     if any(s.form == "symmetric" for s in of_k):
-        return [f"friction terms seem lost: the file holds K as one half of a symmetric matrix; {mend}"]
+        return [f"{LOST}: the file holds K as one half of a symmetric matrix; {mend}"]
     if any(s.form == "general" for s in of_k):
-        return [f"friction terms seem lost: K is stored as not symmetric, yet is, up to rounding; {mend}"]
+        return [f"{LOST}: K is stored as not symmetric, yet is, up to rounding; {mend}"]
     if found.multipliers:
         signs = f"{counted(found.multipliers, 'freedom looks', 'freedoms look')} like multipliers of a contact"
-        return [f"friction terms seem lost: {signs}, yet K is symmetric; {mend}"]
+        return [f"{LOST}: {signs}, yet K is symmetric; {mend}"]
     if internal:
         signs = f"{counted(internal, 'freedom is internal', 'freedoms are internal')}, as contact makes them"
-        return [f"friction terms seem lost: {signs}, yet K is symmetric; {mend}"]
+        return [f"{LOST}: {signs}, yet K is symmetric; {mend}"]
     return ["K is symmetric: without friction terms in it, no modes can couple to flutter"]

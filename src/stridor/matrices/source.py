@@ -181,7 +181,13 @@ def counted(count: int, one: str, more: str) -> str:
     return f"{count} {one if count == 1 else more}"
 
 
-UNENDED = "The last line has no line end: if the file was cut off there, its last number is wrong."
+class Doubt(str):
+    """A note of reading by which numbers may be others than those that were meant: every verb warns of it."""
+
+    __slots__ = ()
+
+
+UNENDED = Doubt("The last line has no line end: if the file was cut off there, its last number is wrong.")
 
 
 def unended(data: bytes) -> tuple[str, ...]:

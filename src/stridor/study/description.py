@@ -14,6 +14,7 @@ from ..case.matrix_checks import MU
 from ..case.schema import Contact, Friction, Load, Spring, TabulatedTable, Tie
 from ..case.usual import USUAL
 from ..errors import AnalysisError
+from ..matrices.report import LOST, NO_FRICTION
 from ..mesh.hanging import hanging
 from ..mesh.model import Mesh
 from ..mesh.quality import edge_lengths, pieces
@@ -251,7 +252,7 @@ def imported_warnings(case: Case, system: System) -> list[str]:
     found: list[str] = []
     if case.imported and not case.contacts:
         for name, report in matrix_reports(case).items():
-            lost = [w for w in report.matrices.warnings if w.startswith("friction terms seem lost")]
+            lost = [w for w in report.matrices.warnings if w.startswith((LOST, NO_FRICTION))]
             found += [f"bodies.{name}: {w}" for w in lost]
     for solid in system.solids:
         if not isinstance(case.bodies[solid.name], MatrixBody):

@@ -94,7 +94,7 @@ def _report(case: Case, name: str, body: MatrixBody, mu: float | None) -> BodyRe
     matrices = report(
         terms.mass, terms.damping, terms.stiffness, labels=terms.labels, stored=terms.stored,
         stiffness_terms=[sp.csr_array(value * share.matrix) for share, value in pairs if share.role == "stiffness"],
-        contacts=contacts, supports=_held(case, name),
+        contacts=contacts, supports=_held(case, name), doubts=terms.doubts,
     )  # fmt: skip
     notes = dict.fromkeys(f"{s.source}: {note}" for s in terms.stored for note in s.notes)
     return BodyReport(matrices, tuple(notes), contacts=tuple(contacts))

@@ -11,7 +11,7 @@ from ..case.usual import LENGTH, USUAL, unusual
 from ..fe.solid import wave_speeds
 from ..laws import Material
 from ..matrices.report import guessed_units, negative_mass
-from ..matrices.source import UNENDED
+from ..matrices.source import Doubt
 from ..mesh.model import Mesh
 from ..mesh.quality import edge_lengths
 from ..system.imported import load_terms
@@ -24,13 +24,16 @@ MANY_PER_WAVE, SMALL_BODY = 1e3, 2e-3  # nor are they above this in a body small
 
 
 def matrix_warnings(case: Case) -> list[str]:
-    """Bodies of imported matrices with negative masses, or from files that may have been cut off."""
+    """Bodies of imported matrices with negative masses, or from files of which it is not sure that they were read as
+    they are meant: cut off, with entries that were added up or mirrored, or with one half of a matrix."""
     found: list[str] = []
     for name, body in case.bodies.items():
         if not isinstance(body, MatrixBody):
             continue
         terms = load_terms(case, name, body)
-        found += dict.fromkeys(f"bodies.{name}: {s.source}: {UNENDED}" for s in terms.stored if UNENDED in s.notes)
+        found += dict.fromkeys(f"bodies.{name}: {doubt}" for doubt in terms.doubts)
+        read = [(s.source, note) for s in terms.stored for note in s.notes if isinstance(note, Doubt)]
+        found += dict.fromkeys(f"bodies.{name}: {source}: {note}" for source, note in read)
         if negative := negative_mass(terms.mass):
             found.append(
                 f"bodies.{name}: {negative}, and what grows for that is no squeal; is the sign of every factor right, "

@@ -25,6 +25,7 @@ from ..mesh.abaqus import read_abaqus
 from ..mesh.model import Mesh
 from ..mesh.paths import check_file, shown_path
 from ..typing import Array, BoolArray, IntArray, Sparse
+from .imported_halves import half_doubts
 
 ROLES: tuple[Role, ...] = ("mass", "damping", "stiffness")
 ROUNDING = 1e-12  # of the entries around it: what A − Aᵀ may hold of a matrix that is meant to be symmetric
@@ -47,7 +48,7 @@ class ImportedTerm:
 class Terms:
     """Summed matrices (n, n) of a body by role in the order of the files' freedoms, in SI units; labels of the
     freedoms, None where nothing names them; stored: the files, each with the role it is used in; shares: the terms that
-    were summed; values: of their factors."""
+    were summed; values: of their factors; doubts: files that may hold one half of a matrix, a sentence each."""
 
     mass: Sparse
     damping: Sparse
@@ -56,6 +57,7 @@ class Terms:
     stored: tuple[StoredMatrix, ...]
     shares: tuple[ImportedTerm, ...]
     values: tuple[float, ...]
+    doubts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -152,6 +154,7 @@ def load_terms(case: Case, name: str, body: MatrixBody, mu: float | None = None)
     if body.labels is not None:
         stored = _with_labels(stored, body.labels, f"{where}.labels")
     matrices, labels = common_labels(stored, where=f"{where}.terms")
+    doubts = half_doubts(case, where, body, stored, matrices)
     size = matrices[0].shape[0]
     if body.scale != 1.0:
         matrices = [_in_metres(matrix, labels, body.scale) for matrix in matrices]
@@ -164,7 +167,8 @@ def load_terms(case: Case, name: str, body: MatrixBody, mu: float | None = None)
         sums[role] = sp.csr_array(sums[role] + factor * matrix)
         shares.append(ImportedTerm(role, matrix, term.factor, path))
         values.append(factor)
-    return Terms(sums["mass"], sums["damping"], sums["stiffness"], labels, tuple(stored), tuple(shares), tuple(values))
+    summed = sums["mass"], sums["damping"], sums["stiffness"]
+    return Terms(*summed, labels, tuple(stored), tuple(shares), tuple(values), doubts)
 
 
 def is_symmetric(matrix: Sparse) -> bool:
