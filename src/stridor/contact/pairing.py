@@ -249,7 +249,8 @@ def overlap_tolerance(position: Array, normals: Array, master: MasterSurface) ->
     position (m, d), normals (m, d): the slave nodes, whose chords are taken between nearest neighbours.
     """
     rounding = 1e-9 * float(np.linalg.norm(np.ptp(position, axis=0)))
-    rounding += 1e-12 * max(float(np.max(np.abs(numbers), initial=0.0)) for numbers in (position, *_placing(master)))
+    rounding += 1e-12 * float(np.abs(position).max(initial=0.0))
+    rounding = max(rounding, *(1e-12 * float(np.max(np.abs(numbers), initial=0.0)) for numbers in _placing(master)))
     height = float(getattr(master, "chord_height", 0.0))
     count = min(len(position), 2 * position.shape[1] - 1)
     if count > 1:
