@@ -85,7 +85,7 @@ def test_time_loops_take_constant_matrices(tmp_path: Path, call):
     ("mass", "expected"),
     [
         (np.array([[2.0, 0.5], [0.5, 1.0]]), "the mass matrix is not diagonal, and beside unsymmetric matrices the time loop needs that; import a lumped mass matrix"),
-        (np.array([[2.0, 0.5], [0.0, 1.0]]), "the mass matrix is not symmetric, and the time loop needs a diagonal one"),
+        (np.array([[2.0, 0.5], [0.25, 1.0]]), "the mass matrix is not symmetric, and the time loop needs a diagonal one"),
         (np.diag([1.0, 0.0]), "1 freedom has no mass, and the time loop needs one at each"),
         (np.diag([1.0, -1.0]), "1 freedom has a negative mass, and the time loop needs a positive one at each"),
     ],
