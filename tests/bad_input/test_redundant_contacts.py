@@ -124,6 +124,7 @@ def test_they_are_named_where_rounding_keeps_the_touching_nodes_from_settling(mo
         raise AnalysisError("steady sliding: the set of touching nodes does not settle")
 
     monkeypatch.setattr(solution, "find_touching", unsettled)
+    monkeypatch.setattr(solution, "of_every_set", lambda equations: iter(()))
     for normals, said in (([(0.0, 1.0)] * 2, TWICE), ([(0.0, 1.0)], "steady sliding: the set of touching nodes")):
         with pytest.raises(AnalysisError, match=f"^{said}"):
             st.steady_sliding(loads(flats(*normals)))

@@ -376,6 +376,20 @@ def test_a_basis_that_lost_a_mode_on_the_way_is_made_anew(lost: int) -> None:
         assert other[: len(inside)] == pytest.approx(inside, rel=1e-7)
 
 
+def test_gaps_stay_closed_on_a_basis_that_is_handed_on_again_and_again() -> None:
+    """Shape and force of what is left of a vector apart from others lose digits each by itself."""
+    system, carried, widest = build_system(coarse(0.45)), Carried(), 0.0
+    for touching_at in (0.1, 0.35, 0.1, 0.35):
+        problem = problem_of(system, touching_at, Options(), frictions=np.linspace(0.0, 0.45, 5))
+        reduced = projected(problem, Band(1, 2 * np.pi * 20e3), 0.45, carried)
+        converge_at(reduced, [0.45, 0.2])
+        carried.take(reduced, GUARD)
+        opening, force = problem.normal @ reduced.pairs.u, problem.compliance[:, None] * reduced.pairs.p
+        size = (abs(problem.normal) @ np.abs(reduced.pairs.u)).max(axis=0)
+        widest = max(widest, float((np.abs(opening + force).max(axis=0) / size).max()))
+    assert widest < 1e-13
+
+
 @pytest.mark.slow  # in each run: the test before on growth from above the band
 def test_growth_that_ends_above_the_band_is_not_taken_for_what_comes_into_it_later() -> None:
     """At 27 kHz a mode grows from μ = 0.226, where a node opens, to 0.464; at 0.5176 it begins again, just above the

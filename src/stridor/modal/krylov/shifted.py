@@ -141,6 +141,8 @@ def _matrix(problem: ContactProblem, shift: float) -> tuple[Sparse, float]:
     return matrix, scale
 
 
+# Of the displacements a gap is made of: as far as it is known.
+ROUNDING = 16 * float(np.finfo(float).eps)
 # Squared length, of one, that a shape must have apart from the others.
 APART = 1e-8
 
@@ -261,7 +263,21 @@ def orthonormal(
             step = np.zeros((new.count, keep))
             step[order[:keep]] = sl.solve_triangular(r[:keep, :keep], np.eye(keep))
             new = new.combined(step)
-    return new, new.u.T @ (mass @ block.u)
+    return closing(problem, new), new.u.T @ (mass @ block.u)
+
+
+def closing(problem: ContactProblem, pairs: ForcedShapes) -> ForcedShapes:
+    """The pairs with forces that close the gaps, N u + c p = 0, to the rounding of N u where contact has a stiffness:
+    of what is left of a shape apart from others, shape and forces lose digits each by itself, and no basis vectors
+    make up for what they say otherwise."""
+    if not pairs.count or len(pairs.p) != problem.nodes:
+        return pairs
+    compliance = problem.compliance[:, None]
+    opening = problem.normal @ pairs.u
+    rounding = ROUNDING * (abs(problem.normal) @ np.abs(pairs.u))
+    wrong = (compliance > 0) & (np.abs(opening + compliance * pairs.p) > rounding)
+    forces = np.divide(-opening, compliance, out=pairs.p.copy(), where=wrong)
+    return ForcedShapes(pairs.u, forces)
 
 
 def real_columns(block: Any) -> Array:
