@@ -168,6 +168,8 @@ def test_friction_opens_what_distances_alone_have_closed(pressed, source):
         assert values[np.isfinite(values)] == pytest.approx([expected], rel=1e-9)
     assert any("2 between μ = 0.2 and 0.3, 1 between μ = 0.3 and 0.4" in note for note in swept.notes)
     assert not any("no load acts" in note for note in (*swept.notes, *single.notes))
+    # Where the stop has neither force nor gap, two sets of nodes are one equilibrium.
+    assert not any("more than one equilibrium" in note for note in swept.notes)
 
 
 def test_onsets_and_numbers_along_take_the_nodes_that_distances_leave():
