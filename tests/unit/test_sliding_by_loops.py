@@ -26,6 +26,10 @@ from stridor.sliding.solution import SteadySliding
 from stridor.sliding.stick_slip import Frictional, Loading, StickSlip
 from stridor.sliding.stretches import Stretch, _different, _Equilibria, _Look, _probes
 from stridor.system.model import AnswerCache
+from stridor.system.motion import PrescribedMotion
+
+STILL = PrescribedMotion.none(2)
+AWAY = replace(PrescribedMotion.none(2), names=("jaw.y",), distances=(1.0,))  # a support pressed away
 
 # What NumPy warns of is a fault here, whatever comes of it.
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
@@ -620,7 +624,7 @@ def test_rows_that_lean_by_rounding_are_the_same(part: float, twice: bool) -> No
 
 
 def test_what_presses_is_told_from_rounding_of_all_loads() -> None:
-    system: Any = SimpleNamespace(loads={"a": np.array([3.0, -4.0]), "b": np.array([0.0, 5.0])}, load_steps=(), contact_nodes=None)
+    system: Any = SimpleNamespace(loads={"a": np.array([3.0, -4.0]), "b": np.array([0.0, 5.0])}, load_steps=(), motion=STILL, contact_nodes=None)
     assert pressing.least_force(system) == pytest.approx(12e-9)
     assert pressing.nothing_presses(system, np.array([0.0, -11.9e-9]))
     assert not pressing.nothing_presses(system, np.array([0.0, -12.1e-9]))
@@ -633,8 +637,16 @@ def test_what_presses_is_told_from_rounding_of_all_loads() -> None:
     system.loads, system.contact_nodes = {}, lambda: SimpleNamespace(count=1)
     pressing.require_pressed(system, np.zeros(1))
     assert len(pressing.taken_as_closed(system)) == 1
-    system.contact_nodes = lambda: SimpleNamespace(count=0)
+    system.motion = AWAY  # its force is known, as that of a load is
     assert pressing.taken_as_closed(system) == ()
+    system.motion, system.contact_nodes = STILL, lambda: SimpleNamespace(count=0)
+    assert pressing.taken_as_closed(system) == ()
+
+
+def test_loads_load_steps_and_distances_act() -> None:
+    for changes, acts in (({}, False), ({"loads": {"P": 1}}, True), ({"load_steps": (1,)}, True), ({"motion": AWAY}, True)):
+        system: Any = SimpleNamespace(**{"loads": {}, "load_steps": (), "motion": STILL, **changes})
+        assert pressing.anything_acts(system) is acts
 
 
 # -- stretches of friction ---------------------------------------------------------------------------------------------
@@ -667,7 +679,7 @@ def model(monkeypatch, forces, *, own: float = 0.1, size: int = 10, none_beyond:
     held = np.isin(np.arange(len(forces)), kept)
     nodes = SimpleNamespace(count=len(forces), kept=held)
     once = AnswerCache().once
-    return SimpleNamespace(contact_nodes=lambda: nodes, loads={"P": 1}, load_steps=(), size=size, once=once), asked
+    return SimpleNamespace(contact_nodes=lambda: nodes, loads={"P": 1}, load_steps=(), motion=STILL, size=size, once=once), asked
 
 
 LINES = [(1.0, 1.0), (1.0, -1 / 0.31), (-0.1, 1 / 3.3), (1.0, -1 / 0.7001)]  # change at 0.31, 0.33 and 0.7001
@@ -748,6 +760,18 @@ def test_nothing_is_looked_at_where_nothing_can_change(monkeypatch) -> None:
         vars(system).update(changes)
         assert stretches.stretches(system, 0.1, 0.5) == whole
         assert asked == []
+
+
+def test_a_distance_alone_presses_as_a_load_does(monkeypatch) -> None:
+    system, _ = model(monkeypatch, LINES)
+    by_load = stretches.stretches(system, 0.0, 0.9)
+    system, _ = model(monkeypatch, LINES)
+    vars(system).update(loads={}, motion=AWAY)
+    assert stretches.stretches(system, 0.0, 0.9) == by_load
+    assert len(by_load) == 4
+    system, _ = model(monkeypatch, LINES, own=0.9, none_beyond=0.5)
+    vars(system).update(loads={}, motion=AWAY)
+    assert stretches.instead_of_own(system, 0.0, 0.4) == pytest.approx(0.2)
 
 
 def test_own_friction_without_steady_sliding_says_nothing_of_others(monkeypatch) -> None:

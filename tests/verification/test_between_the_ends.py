@@ -171,6 +171,18 @@ def test_a_growing_pair_that_parts_is_said_to():
     assert "A growing pair has parted into two motions that grow without oscillating." in found.completeness
 
 
+def test_a_value_at_an_onset_is_not_held_against_it():
+    """A mass between two belts at right angles, K = [[1, −2μ], [−μ, 2]]: it diverges from μ = 1 on, which is the fourth of
+    twelve parts of the range, and rounding decides whether something grows there."""
+    belts = {
+        name: {"normal": normal, "tangent": normal[::-1], "stiffness": k, "slip": 1.0, "friction": {"law": "coulomb", "coefficient": 0.3}}
+        for name, normal, k in (("a", [1.0, 0.0], 1.0), ("b", [0.0, 1.0], 2.0))
+    }
+    found = st.onsets(System.from_matrices(np.eye(2), None, np.zeros((2, 2)), contacts=belts), (0.0, 3.0), max_frequency_hz=1.0)
+    assert [(o.kind, o.mu) for o in found] == [("divergence", pytest.approx(1.0, abs=1e-12))]
+    assert "As many roots grow at each of 10 further values as the onsets say." in found.completeness
+
+
 def test_what_could_not_be_checked_is_not_called_complete(monkeypatch):
     def failing(*_: object, **__: object) -> None:
         raise AnalysisError("the quadratic problem is singular for every λ")

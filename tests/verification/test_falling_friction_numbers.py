@@ -180,6 +180,67 @@ def test_onsets_without_damping_of_the_structure_keep_the_slope_of_friction():
             assert grows == sum(-1 if o.stabilising else 1 for o in said if o.mu < mu)
 
 
+# A mass on a belt, whose dashpot a support draws upwards at speed v: N = 1 − 0.8 v.
+DRAWN = """
+units = "nondimensional"
+bodies.m = {{ type = "mass", mass = 1.0, position = [0.0, 0.0] }}
+bodies.top = {{ type = "mass", mass = 1.0, position = [0.0, 1.0] }}
+bodies.belt = {{ type = "obstacle", shape = "flat", point = [0.0, 0.0], normal = [0.0, 1.0], sliding = {{ velocity = [1.0, 0.0] }} }}
+supports.top = {{ at = "top", fixed = ["x", "y"], velocity = {{ y = {speed} }} }}
+springs.k = {{ between = ["m", "ground"], stiffness = 1.0, damping = {along}, direction = [1.0, 0.0] }}
+dashpots.d = {{ between = ["m", "top"], damping = 0.8, direction = [0.0, 1.0] }}
+loads.press = {{ at = "m", force = [0.0, -1.0] }}
+[contacts.rub]
+slave = "m"
+master = "belt"
+stiffness = "rigid"
+friction = {{ law = "hyperbolic", coefficient = 0.0, static_coefficient = 1.0, delta = 1.0 }}
+[modal]
+max_frequency_hz = 1.0
+source = "{source}"
+"""
+
+
+@pytest.mark.parametrize("source", ["krylov", "full", pytest.param("reduced", marks=pytest.mark.slow)])
+def test_without_damping_steady_sliding_keeps_the_drag_of_what_moves(source: str):
+    """Only small motions lose their damping: the slope −μ/2 feeds N μ/4 = 0.075 into them at N = 0.6 and μ = 0.5."""
+    case = loads(DRAWN.format(speed=0.5, along=0.0, source=source))
+    bare = modes(case, 0.5, damped=False)
+    assert bare.eigenvalues[0] == pytest.approx([0.075 + 1j * np.sqrt(1 - 0.075**2)], rel=1e-9)
+    assert modes(case, 0.5).eigenvalues[0] == pytest.approx(bare.eigenvalues[0], rel=1e-9)  # nothing damps it along
+    with pytest.raises(AnalysisError, match="no equilibrium"):  # 1 − 0.8 · 1.5 < 0: it lifts off
+        modes(loads(DRAWN.format(speed=1.5, along=0.0, source=source)), 0.5, damped=False)
+
+
+def test_what_has_no_damping_has_the_equilibrium_of_what_has():
+    case = loads(DRAWN.format(speed=0.5, along=0.4, source="krylov"))
+    assert modes(case, 0.5).growth_rate[0] == pytest.approx([0.075 - 0.2], rel=1e-9)
+    lam = np.linalg.eigvals(-st.pencil(case, 0.5, damped=False).matrices()[1].toarray()[:1, :1])
+    assert lam == pytest.approx([0.15], rel=1e-12)
+    found = onsets(case, damped=False, friction_range=(0.2, 0.6))
+    assert found.complete
+    assert [lam.real for lam in found.at_start] == pytest.approx([0.25 * 0.6 * 0.2], rel=1e-9)
+    assert sensitivities(case, "mu", mu=0.5, damped=False).derivative[0, 0].real == pytest.approx(0.25 * 0.6, rel=1e-6)
+
+
+def test_receptances_without_damping_are_about_the_same_steady_sliding(falling: Case):
+    """Two beams of few elements: a dashpot that moves draws the upper one up with 5 N of the 20 N that press it."""
+    case = falling.with_({
+        "bodies.beam1.elements": 2, "bodies.beam2.elements": 3, "modal.max_frequency_hz": 3e3,
+        "bodies.hand": {"type": "mass", "mass": 1.0, "position": [0.1, 0.1]},
+        "supports.hand": {"at": "hand", "fixed": ["x", "y"], "velocity": {"y": 0.5}},
+        "dashpots.d": {"between": ["beam1.top", "hand"], "damping": 10.0, "direction": [0.0, 1.0]},
+    })  # fmt: skip
+    assert st.steady_sliding(case, mu=0.2).normal_force == pytest.approx([15.0], rel=1e-6)
+    found, expected = (
+        np.sort_complex([1j * lam.conj() for lam in one.eigenvalues[0] if lam.imag])
+        for one in (modes(case.with_({"modal.source": s}), 0.2, damped=False, check=False) for s in ("receptance", "full"))
+    )
+    assert len(found) == 4
+    assert found.imag.max() > 1.0  # what grows
+    np.testing.assert_allclose(found, expected, rtol=1e-7)
+
+
 def test_a_change_that_leaves_no_equilibrium_leaves_the_ranking_and_is_told(few, monkeypatch):
     from stridor.study import countermeasures as module
 

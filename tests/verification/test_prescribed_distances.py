@@ -8,6 +8,7 @@ import pytest
 import stridor as st
 from stridor.case import loads
 from stridor.sliding import steady_sliding
+from stridor.sliding.stretches import stretches_along
 from stridor.temporal.energy import energy_balance
 
 pytestmark = pytest.mark.verification
@@ -116,6 +117,71 @@ def test_modes_know_what_touches():
     assert np.min(np.abs(frequencies / between_walls - 1)) < 0.01
     with pytest.raises(st.AnalysisError, match="no contact carries load"):
         st.modes(bar(jaw="displacement = { x = 1e-5 }"), mu=0.0)
+
+
+# A mass between a belt below and a stop on its left; its springs (kx = 1, ky = 2) hang on an arm.
+CORNER = """
+units = "nondimensional"
+bodies.m = {{ type = "mass", mass = 1.0, position = [0.0, 0.0] }}
+bodies.arm = {{ type = "mass", mass = 1.0, position = [-1.0, 1.0] }}
+bodies.belt = {{ type = "obstacle", shape = "flat", point = [0.0, 0.0], normal = [0.0, 1.0], sliding = {{ velocity = [1.0, 0.0] }} }}
+bodies.stop = {{ type = "obstacle", shape = "flat", point = [0.0, 0.0], normal = [1.0, 0.0] }}
+springs.x = {{ between = ["m", "arm"], stiffness = 1.0, direction = [1.0, 0.0] }}
+springs.y = {{ between = ["m", "arm"], stiffness = 2.0, direction = [0.0, 1.0] }}
+supports.arm = {{ at = "arm", fixed = ["x", "y"]{arm} }}
+[contacts.rub]
+slave = "m"
+master = "belt"
+stiffness = "rigid"
+{rub}
+friction = {{ law = "hyperbolic", coefficient = 0.0, static_coefficient = 0.2, delta = 1.0 }}
+[contacts.stop]
+slave = "m"
+master = "stop"
+stiffness = 3.0
+{stop}
+friction = {{ law = "coulomb", coefficient = 0.0 }}
+[modal]
+max_frequency_hz = 1.0
+friction_range = [0.0, 0.6]
+source = "{source}"
+"""
+PUSHED = {"arm": ", displacement = { x = -0.3, y = -0.5 }", "rub": "", "stop": ""}
+FITTED = {"arm": "", "rub": "interference = 0.5", "stop": "interference = 0.3"}
+
+
+@pytest.mark.parametrize(
+    ("pressed", "source"),
+    [
+        (PUSHED, "full"),
+        (FITTED, "krylov"),
+        *(pytest.param(p, s, marks=pytest.mark.slow) for p, s in ((PUSHED, "krylov"), (PUSHED, "reduced"), (FITTED, "reduced"))),
+    ],
+)
+def test_friction_opens_what_distances_alone_have_closed(pressed, source):
+    """Without any load: N = 2 · 0.5 = 1, and the stop opens where μN = 1 · 0.3, below which it stiffens the mass by 3.
+    Friction that falls with the slip feeds N μ/2 into its damping: λ² − μλ/2 + k = 0."""
+    case = loads(CORNER.format(**pressed, source=source))
+    swept, single = st.modes(case, [0.2, 0.4]), st.modes(case, 0.4)  # the case's own is 0.1, at which the stop is closed
+    for values, mu, k in ((swept.eigenvalues[0], 0.2, 4.0), (swept.eigenvalues[1], 0.4, 1.0), (single.eigenvalues[0], 0.4, 1.0)):
+        expected = mu / 4 + 1j * np.sqrt(k - mu**2 / 16)
+        assert values[np.isfinite(values)] == pytest.approx([expected], rel=1e-9)
+    assert any("2 between μ = 0.2 and 0.3, 1 between μ = 0.3 and 0.4" in note for note in swept.notes)
+    assert not any("no load acts" in note for note in (*swept.notes, *single.notes))
+    # Where the stop has neither force nor gap, two sets of nodes are one equilibrium.
+    assert not any("more than one equilibrium" in note for note in swept.notes)
+
+
+def test_onsets_and_numbers_along_take_the_nodes_that_distances_leave():
+    """The stop opens at μ = 0.3, and at the friction of 0.1 where N = 2 y is 3."""
+    case = loads(CORNER.format(**PUSHED, source="auto"))
+    found = st.onsets(case)
+    assert any("2 between μ = 0 and 0.3, 1 between μ = 0.3 and 0.6" in note for note in found.notes)
+    assert not any("no load acts" in note for note in found.notes)
+    own, path = st.build_system(case), "supports.arm.displacement.y"
+    along = stretches_along(lambda y: st.build_system(case.with_({path: y})), own, -2.0, -0.5)
+    assert [s.touching for s in along] == [1, 2]
+    assert along[0].high == pytest.approx(-1.5, abs=1e-6)
 
 
 def test_stresses_are_those_of_the_bar_and_its_jaw():

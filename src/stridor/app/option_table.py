@@ -140,7 +140,7 @@ Undamped = Annotated[
     bool,
     _option(
         "--undamped",
-        "Leave structural damping out.",
+        "Leave structural damping out of small motions; steady sliding keeps the drag of what moves.",
         on="modes shapes onsets sensitivities countermeasures",
         lacks="steady=static simulate=time cycles=time compare=time run=both "
         "report=both damping-map=damping boundary=kept "

@@ -24,6 +24,7 @@ from .tolerances import SPLIT_RELATIVE, UNSTABLE_RELATIVE
 
 SMALL = 40  # freedoms up to which a few μ between the ends are looked at
 INTERVALS = 12
+AT_ONSET = 1e-9  # of the highest μ: an onset no further from a value is at it, and rounding decides what grows there
 MARGIN = 1.01  # times the highest frequency: every branch
 
 
@@ -58,7 +59,7 @@ def between_ends(
     if system.size > SMALL:
         return NOT_LOOKED
     low, high = found.friction_range
-    inner = np.linspace(low, high, INTERVALS + 1)[1:-1].tolist()
+    inner = [mu for mu in np.linspace(low, high, INTERVALS + 1)[1:-1].tolist() if not _at_onset(found, mu)]
     try:
         problem = problem_of(system if damped else system.undamped(), None, options)
         differ = [mu for mu in inner if _growing_roots(problem, mu, start) != _said(found, start, mu)]
@@ -96,6 +97,13 @@ def _said(found: Onsets, start: Growing, mu: float) -> int:
     """How many eigenvalues grow in the band at μ by what grows at the low end and the onsets below it."""
     passed = [o.roots for o in found.onsets if (o.mu if o.enters_at is None else o.enters_at) < mu]
     return growing_roots(start.values) + sum(passed) + 2 * sum(at < mu for _, at in found.entering)
+
+
+def _at_onset(found: Onsets, mu: float) -> bool:
+    """Whether growth begins or ends, or comes into the band, at μ but for rounding."""
+    places = [at for o in found.onsets for at in (o.mu, o.enters_at) if at is not None]
+    places += [at for _, at in found.entering]
+    return any(abs(at - mu) <= AT_ONSET * found.friction_range[1] for at in places)
 
 
 def _growing_roots(problem: ContactProblem, mu: float, start: Growing) -> int:

@@ -21,7 +21,16 @@ import scipy.sparse as sp
 
 from ..errors import AnalysisError
 from ..laws.friction import share_of, slope_at
-from ..sliding import force_rates, full_motion, least_force, require_pressed, slip_speeds, steady_nodes, steady_sliding
+from ..sliding import (
+    anything_acts,
+    force_rates,
+    full_motion,
+    least_force,
+    require_pressed,
+    slip_speeds,
+    steady_nodes,
+    steady_sliding,
+)
 from ..system import System
 from ..typing import Array, ComplexArray
 from .pencil import Pencil
@@ -137,11 +146,11 @@ def _blocks(a: ComplexArray, b: ComplexArray, c: ComplexArray, d: ComplexArray) 
 
 def couple(system: System, *, mu: float | None = None) -> tuple[PointCoupling, tuple[str, ...]]:
     """Coupling of the contacts that touch in steady sliding at `System.touching_at`, else at ``mu``, else at the
-    laws' own coefficients, and the names of those that do not. Without loads every contact counts as touching."""
+    laws' own coefficients, and the names of those that do not. Where nothing acts every contact counts as touching."""
     open_names: tuple[str, ...] = ()
     velocities = full_motion(system)
     system = system.in_place()
-    if system.contacts and system.loads:
+    if system.contacts and anything_acts(system):
         steady = steady_nodes(system, mu if system.touching_at is None else system.touching_at)
         require_pressed(system, steady.normal_force)
         # A contact that only rounding presses is not closed, unless it is kept so.
@@ -155,7 +164,7 @@ def couple(system: System, *, mu: float | None = None) -> tuple[PointCoupling, t
         pulls = np.zeros(len(system.contacts), dtype=bool)
     speeds = slip_speeds(system, velocities)
     sloped = any(c.law.slope(abs(float(v))) != 0.0 for c, v in zip(system.contacts, speeds, strict=True))
-    if sloped and not system.loads:
+    if sloped and not anything_acts(system):
         raise AnalysisError(
             "a friction law with a slope needs the normal force: give the case a load that presses the bodies"
         )

@@ -211,7 +211,7 @@ def sources_for(system: System, options: Options) -> tuple[EigenSource, ...]:
         names = ", ".join(source.name for source in SOURCES)
         raise CaseError("source", name, f"one of {names}, or none for what suits")
     if why := chosen.refuses(system, options):
-        raise AnalysisError(f"source {name}: {why}; {_others(system, options)}")
+        raise AnalysisError(f"source {name}: {why}; {_others(system, options, name)}")
     return (chosen,)
 
 
@@ -258,10 +258,10 @@ def answered(
         _log.info("source %s, %s", last.name, chosen)
         return replace(ask(last, asked), source=last.name)
     except Unfit as error:
-        raise Unfit(f"source {last.name}: {error}; {_others(system, asked.options)}") from error
+        raise Unfit(f"source {last.name}: {error}; {_others(system, asked.options, last.name)}") from error
 
 
-def _others(system: System, options: Options) -> str:
-    """What to ask for instead of a source that does not serve."""
-    fit = [source.name for source in SOURCES if not source.refuses(system, options)]
+def _others(system: System, options: Options, failed: str) -> str:
+    """What to ask for instead of the source ``failed``, which does not serve."""
+    fit = [source.name for source in SOURCES if source.name != failed and not source.refuses(system, options)]
     return f"leave it out for what suits, or take {' or '.join(fit)}"

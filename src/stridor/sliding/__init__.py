@@ -2,7 +2,7 @@
 
 from .equilibrium import share_factors
 from .motions import full_motion, slip_speeds
-from .pressing import least_force, nothing_presses, require_pressed, taken_as_closed
+from .pressing import anything_acts, least_force, nothing_presses, require_pressed, taken_as_closed
 from .resultants import Balance, Resultant
 from .solution import SteadySliding, force_rates, friction_damping_matrix, steady_nodes, steady_sliding, touching
 
@@ -10,6 +10,7 @@ __all__ = [
     "Balance",
     "Resultant",
     "SteadySliding",
+    "anything_acts",
     "force_rates",
     "friction_damping_matrix",
     "full_motion",

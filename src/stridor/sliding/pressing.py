@@ -16,6 +16,16 @@ def least_force(system: System) -> float:
     return NOTHING * sum(float(np.abs(vector).sum()) for vector in system.loads.values())
 
 
+def anything_acts(system: System) -> bool:
+    """Whether something that presses bodies is known: loads, load steps, or a prescribed distance (a support pressed
+    away, an interference), which are loads once `System.in_place` has them there.
+
+    Without any of them which contacts touch is not known, and what is linear takes all of them as closed: everybody who
+    decides by that asks here.
+    """
+    return bool(system.loads or system.load_steps or any(system.motion.full_distance))
+
+
 def nothing_presses(system: System, normal_force: Array) -> bool:
     """Whether normal forces (m,) [N] of steady sliding are all nothing but rounding of the loads: modes, runs and
     checks all ask here."""
@@ -25,7 +35,8 @@ def nothing_presses(system: System, normal_force: Array) -> bool:
 def require_pressed(system: System, normal_force: Array) -> None:
     """Raise AnalysisError where nothing presses the contacts whose normal forces (m,) [N] in steady sliding are given.
 
-    Systems without any load have no normal force that is known, and pass: their contacts are taken as closed.
+    system: with distances in their place, which are among its loads then. Systems on which nothing acts have no normal
+    force that is known, and pass: their contacts are taken as closed.
     """
     if not len(normal_force) or not system.loads or not nothing_presses(system, normal_force):
         return
@@ -38,8 +49,8 @@ def require_pressed(system: System, normal_force: Array) -> None:
 
 
 def taken_as_closed(system: System) -> tuple[str, ...]:
-    """What a linearisation says of contacts that no load presses; nothing where there are loads or no contacts."""
-    if system.loads or system.load_steps or not system.contact_nodes().count:
+    """What a linearisation says of contacts on which nothing acts; nothing where something does or there are none."""
+    if anything_acts(system) or not system.contact_nodes().count:
         return ()
     return (
         "no load acts: which contacts touch is not known, and all of them are taken as closed, as under a load that "

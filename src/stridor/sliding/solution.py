@@ -306,9 +306,12 @@ def _others(system: System, found: SteadySliding, mu: float | None, free: IntArr
         except AnalysisError:
             continue
         force, gap, own = held.normal_force[free], held.gap[free], active[free]
-        # One that differs in contacts without force and gap is the same.
-        pushes = force[own] > 1e-9 * np.abs(force).max(initial=0.0)
-        if pushes.all() and np.all(gap[~own] > 1e-9 * np.abs(gap).max(initial=0.0)):
+        # One that differs in contacts without force and gap is the same. All gaps may be none but for rounding.
+        largest = float(np.abs(held.normal_force).max(initial=0.0))
+        stiffest = float(np.abs(system.stiffness.data).max(initial=0.0))
+        rounding = ROUNDING * largest / stiffest if stiffest else 0.0
+        pushes = force[own] > 1e-9 * largest
+        if pushes.all() and np.all(gap[~own] > max(1e-9 * float(np.abs(gap).max(initial=0.0)), rounding)):
             names = tuple(dict.fromkeys(nodes.names[k] for k in nodes.owner[active]))
             others.append(OtherEquilibrium(active, held.normal_force, names))
     return others

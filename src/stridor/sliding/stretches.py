@@ -17,6 +17,7 @@ from ..errors import AnalysisError, NotSlidingError
 from ..system import System
 from ..typing import Array, BoolArray
 from .equilibrium import FEW
+from .pressing import anything_acts
 from .solution import ALL_TRIED, STEADY, SteadySliding, other_equilibria, steady_nodes, steady_sliding
 
 HELD = "are held at every μ of the model"  # nodes of one friction coefficient
@@ -72,12 +73,12 @@ def stretches(
     """The stretches that make up the friction coefficients from ``low`` to ``high``, in order. at (k,): μ between them
     whose own nodes have to be right; they are looked at whatever the others show, up to LOOKS of them.
 
-    One, without a look, where nothing can change: no loads, every contact kept closed, or contacts that may stick,
+    One, without a look, where nothing can change: nothing acts, every contact kept closed, or contacts that may stick,
     whose state is held (`System.load_steps`). A set that comes and goes between two looks that agree is not seen. Where
     more than MOST nodes open or close, the range is cut into EQUAL parts, each with the nodes of its middle.
     """
     nodes = system.contact_nodes()
-    if not nodes.count or not system.loads or system.load_steps or bool(np.all(nodes.kept)):
+    if not nodes.count or not anything_acts(system) or system.load_steps or bool(np.all(nodes.kept)):
         return (Stretch(low, high, None),)
     search = _Equilibria(system, solver)
     own = search.own()
@@ -97,7 +98,7 @@ def stretches_along(
     that of the case as it is. ``Stretch.at`` is a value of this number, and every contact has its own friction; rubs:
     the number is the friction of all contacts, and something else too."""
     nodes = own.contact_nodes()
-    if not nodes.count or not own.loads or own.load_steps or bool(np.all(nodes.kept)):
+    if not nodes.count or not anything_acts(own) or own.load_steps or bool(np.all(nodes.kept)):
         return (Stretch(low, high, None),)
     search = _Along(own, system_at, max(abs(low), abs(high)), solver, rubs=rubs)
     looks = [search.at(float(value)) for value in np.linspace(low, high, LOOKS if own.size <= SMALL else FEWER)]
@@ -187,7 +188,7 @@ def instead_of_own(system: System, low: float, high: float, *, solver: str | Non
     """The μ from low to high whose touching nodes are held where there is no steady sliding at the case's own friction;
     None where there is, or nowhere in the middle or at the ends either."""
     nodes = system.contact_nodes()
-    if not nodes.count or not system.loads or system.load_steps:
+    if not nodes.count or not anything_acts(system) or system.load_steps:
         return None
     search = _Equilibria(system, solver)
     if search.own() is not None:

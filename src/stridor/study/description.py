@@ -19,7 +19,7 @@ from ..mesh.hanging import hanging
 from ..mesh.model import Mesh
 from ..mesh.quality import edge_lengths, pieces
 from ..notebook import Shown, counted, html_table
-from ..sliding import steady_nodes
+from ..sliding import anything_acts, steady_nodes
 from ..sliding.solution import SteadySliding
 from ..system import System
 from ..temporal.inputs import unfit_in_time
@@ -301,7 +301,7 @@ def _load_words(load: Load) -> str:
 def _contact_lines(case: Case, system: System, data: dict[str, Any]) -> list[str]:
     """Every contact in steady sliding: nodes that touch, forces and moments, pressure, the balance."""
     nodes = system.contact_nodes()
-    if not nodes.count or not system.in_place().loads:
+    if not nodes.count or not anything_acts(system):
         return []
     try:
         steady = steady_nodes(system)

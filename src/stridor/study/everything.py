@@ -16,6 +16,7 @@ from ..case.matrix_checks import MU
 from ..errors import AnalysisError
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onsets
+from ..sliding import anything_acts
 from ..sliding.solution import SteadySliding
 from ..system import System
 from ..temporal.shapes import operating_shape
@@ -192,7 +193,7 @@ def compute_everything(
     system = work.structured("run") if timed else work.system(mu)
     own = mu if mu is not None else _own_friction(work)
     description = clock("check", lambda: analyses.describe(work))
-    loaded = system.contact_nodes().count and system.in_place().loads
+    loaded = system.contact_nodes().count and anything_acts(system)
     steady = None
     if loaded:
         steady = clock("check", lambda: _or_note(lambda: work.steady(mu), notes, "no steady sliding"), STEADY)

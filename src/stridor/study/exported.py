@@ -19,7 +19,7 @@ import scipy.sparse as sp
 from ..errors import AnalysisError, CaseError
 from ..matrices.model import Role
 from ..modal.krylov.problem import ContactProblem, problem_of
-from ..sliding import full_motion
+from ..sliding import anything_acts, full_motion
 from ..system import System
 from ..typing import Array, IntArray, Sparse
 from .asked import require_friction
@@ -187,7 +187,7 @@ def _bent(system: System, contact: ContactProblem) -> str:
 
 def _other_nodes(work: Workspace, system: System, contact: ContactProblem) -> tuple[str, ...]:
     """A note where other nodes touch at the ends of the range of μ than at the contacts' own coefficients."""
-    if not system.loads:
+    if not anything_acts(system):
         return ()
     for mu in work.modal.friction_range:
         try:

@@ -240,16 +240,12 @@ class System(Shown):
         return not self.not_symmetric_definite
 
     def undamped(self) -> System:
-        """The same system without structural damping (paper eq. 5)."""
-        return self.once("undamped", self._undamped)
+        """The same system whose small motions have no structural damping (paper eq. 5).
 
-    def _undamped(self) -> System:
-        motion = replace(
-            self.motion,
-            damping=np.zeros_like(self.motion.damping),
-            damping_own=np.zeros_like(self.motion.damping_own),
-        )
-        return replace(self, damping=sp.csr_array(self.damping.shape), motion=motion)
+        What its motions drag with stays: that is a force of steady sliding, and small motions are about the
+        equilibrium that the damped system has.
+        """
+        return self.once("undamped", lambda: replace(self, damping=sp.csr_array(self.damping.shape)))
 
     def in_place(self, factors: Array | None = None) -> System:
         """The system with everything that a prescribed distance presses away in its place, as the statics and the modes

@@ -13,6 +13,7 @@ from ...contact.nodes import ContactNodes
 from ...errors import AnalysisError, NotSlidingError
 from ...sliding import (
     SteadySliding,
+    anything_acts,
     friction_damping_matrix,
     full_motion,
     require_pressed,
@@ -31,7 +32,7 @@ class TouchingNodes:
     """Nodes in contact: active (m,), and sense (m, d−1), the unit vector against the slip, zero where there is none;
     stuck (m,): touching nodes that do not slip either way. still: whether some slip at their limit without a motion
     that slides them. words: the same for a reader, "" where every node slides. force (m,): normal forces
-    [N], None without loads."""
+    [N], None where nothing acts."""
 
     active: BoolArray
     sense: Array
@@ -93,13 +94,13 @@ def refuse_stick(system: System, what: str) -> None:
 
 def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver: str | None) -> TouchingNodes:
     """The nodes that carry load in steady sliding at `System.touching_at`, else at ``mu``, else at the laws' own
-    coefficients; all of them where the system has no loads.
+    coefficients; all of them where nothing acts on the system.
 
     Raises AnalysisError where there is no steady sliding, or nothing that presses.
     """
     system = system.in_place()
     mu = mu if system.touching_at is None else system.touching_at
-    if (system.loads or system.load_steps) and nodes.count:
+    if anything_acts(system) and nodes.count:
         try:
             steady = steady_nodes(system, mu, solver)
         except NotSlidingError:
@@ -264,7 +265,7 @@ def steadiness(
     prestress = options.prestress and system.stress_stiffness is not None
     system = system.in_place()
     hardens = bool(np.any(nodes.cubic[touching] > 0))
-    if (sloped or across or prestress or hardens) and not (system.loads or system.load_steps):
+    if (sloped or across or prestress or hardens) and not anything_acts(system):
         what = (
             "a friction law with a slope" if sloped
             else "friction damping" if across
@@ -272,8 +273,8 @@ def steadiness(
             else "contact stiffness with a cubic term"
         )  # fmt: skip
         raise AnalysisError(f"{what} needs the normal force: give the case a load that presses the bodies")
-    # Without loads nothing stretches them.
-    stretches = system.cubic is not None and bool(system.cubic.coefficient.size and (system.loads or system.load_steps))
+    # Where nothing acts nothing stretches them.
+    stretches = system.cubic is not None and bool(system.cubic.coefficient.size and anything_acts(system))
     return Steadiness(
         system, nodes, touching, sloped, across, prestress, options.solver, hardens, stretches, layer
     )
