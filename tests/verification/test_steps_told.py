@@ -80,7 +80,9 @@ def test_a_step_that_hides_growth_is_told_and_the_one_named_shows_it(capsys: pyt
     speed = np.linalg.norm(run.velocity[:, 0], axis=1)
     assert speed[-10:].max() < 0.1 * speed[:10].max()  # what should have grown by e²² has decayed
     show_run(st.summarise(case, run).to_json())
-    assert "to the period of modal.max_frequency_hz" in " ".join(capsys.readouterr().out.split())
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "to the period of modal.max_frequency_hz" in shown
+    assert "do not resolve 30000 Hz; " in shown  # of the records
     resolved = case.with_({"temporal.step": 4.1e-7})
     again = st.simulate(resolved)
     assert "to the period of" not in again.path_reason

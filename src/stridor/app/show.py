@@ -38,7 +38,7 @@ def show_run(summary: dict[str, Any]) -> None:
             stdout.print(said)
     else:
         for said in summary["path_reason"].split("; "):
-            if said.startswith("steps of "):
+            if said.startswith(("steps of ", "records every ")):
                 stdout.print(said)
 
 
