@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -68,7 +70,9 @@ duration = 0.01
 """
 
 
-def test_a_step_that_hides_growth_is_told_and_the_one_named_shows_it(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_step_that_hides_growth_is_told_and_the_one_named_shows_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     case = st.loads(PAD)
     modes = st.modes(case).eigenvalues[0]
     growing = modes[modes.real > 1.0]
@@ -77,6 +81,9 @@ def test_a_step_that_hides_growth_is_told_and_the_one_named_shows_it(capsys: pyt
     (told,) = (said for said in run.path_reason.split("; ") if "to the period of" in said)
     assert told.startswith(f"steps of {run.step:.3g} s are 4.3 to the period of modal.max_frequency_hz = 30000 Hz: ")
     assert "temporal.step = 4.1e-07 takes 80 or more" in told
+    assert run.remarks[0] == told
+    assert len(run.remarks) == 2
+    assert st.open(st.save(run, tmp_path / "run.nc")).remarks == run.remarks
     speed = np.linalg.norm(run.velocity[:, 0], axis=1)
     assert speed[-10:].max() < 0.1 * speed[:10].max()  # what should have grown by e²² has decayed
     show_run(st.summarise(case, run).to_json())

@@ -34,12 +34,11 @@ def show_run(summary: dict[str, Any]) -> None:
         f"{summary['steps']} steps of {summary['dt']:.4g} s in {summary['wall_seconds']:.1f} s, {summary['path']} path"
     )
     if summary["path"] in ("exact", "implicit"):
-        for said in summary["path_reason"].split("; ")[1:]:
+        own = summary["path_reason"].removesuffix("; ".join(("", *summary["remarks"])))
+        for said in own.split("; ")[1:]:
             stdout.print(said)
-    else:
-        for said in summary["path_reason"].split("; "):
-            if said.startswith(("steps of ", "records every ")):
-                stdout.print(said)
+    for said in summary["remarks"]:
+        stdout.print(said)
 
 
 _QUANTITIES = {

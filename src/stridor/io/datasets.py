@@ -174,7 +174,7 @@ def _run_of(data: Any) -> Trajectory:
         state={name: data[f"restart_{name}"].values for name in names["state"]},
         provenance=json.loads(data.attrs["provenance"]),
         nodes=_load_nodes(data, tuple(names["contacts"])),
-        **scalars,
+        **scalars | {"remarks": tuple(str(said) for said in scalars.get("remarks", ()))},
     )
 
 

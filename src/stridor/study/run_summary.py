@@ -86,6 +86,7 @@ class RunSummary(Shown):
             "limiting_body": run.limiting_body,
             "path": run.path,
             "path_reason": run.path_reason,
+            "remarks": list(run.remarks),
             "most_sweeps": run.most_sweeps,
             "unconverged_steps": run.unconverged_steps,
             "wall_seconds": run.wall_seconds,

@@ -51,10 +51,11 @@ class March:
         self.phases.resume(restart)
         self.restart, self.first_step = restart, restart.steps
 
-    def _told(self) -> tuple[str, str]:
-        """What to say of the step and of the records, each "" where nothing is."""
+    def _told(self) -> tuple[str, ...]:
+        """What to say of the step and of the records."""
         step = self.stepper.scheme.step
-        return coarse(step, self.settings, self.stepper.path), unresolved(step, self.settings)
+        said = coarse(step, self.settings, self.stepper.path), unresolved(step, self.settings)
+        return tuple(filter(None, said))
 
     def run(self, progress: Progress | None, checkpoint: Checkpoint | None, every_seconds: float) -> Trajectory:
         """To the end, or to where it is stopped. Raises AnalysisError, with what was computed in its ``trajectory``."""
@@ -157,6 +158,7 @@ class March:
             planned_steps=self.schedule.steps,
             path=stepper.path,
             path_reason="; ".join(filter(None, (stepper.reason, *self._told()))),
+            remarks=self._told(),
             step_limit=stepper.limit.step,
             limiting_body=stepper.limit.body,
             most_sweeps=most_sweeps,

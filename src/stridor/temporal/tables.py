@@ -87,6 +87,7 @@ def run_dataset(run: Trajectory) -> Any:
         "unconverged_steps",
         "interrupted",
         "wall_seconds",
+        "remarks",
     )
     changes = changes_of(run)
     if changes:

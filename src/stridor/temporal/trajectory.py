@@ -74,7 +74,8 @@ class Trajectory(Shown):
     name (r,) [J] up to there: damping, friction and contact count what is taken out, external and support what is put
     in.
     sampling [s] between records; step Δt [s]; path modal, nodal or assembled; nodes histories of single contact nodes
-    where the path keeps them; state everything a restart needs.
+    where the path keeps them; state everything a restart needs. path_reason: why it was that path, and what came of it;
+    remarks, which end it: sentences on the step and on the records.
     """
 
     time: Array
@@ -108,6 +109,7 @@ class Trajectory(Shown):
     state: Mapping[str, Array] = field(default_factory=dict)
     provenance: dict[str, Any] = field(default_factory=dict)
     nodes: NodeHistory | None = None
+    remarks: tuple[str, ...] = ()
 
     @property
     def notes(self) -> tuple[str, ...]:
