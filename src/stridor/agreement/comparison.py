@@ -21,15 +21,16 @@ from ..modal.options import Options
 from ..system import System
 from ..temporal.schedule import PhaseSpec
 from ..temporal.shapes import operating_shape
-from ..temporal.signals import Components, Growth, growth, low_passed, spectrum
+from ..temporal.signals import Components, Growth, growth, low_passed, strongest_line
 from ..temporal.simulate import Settings, simulate
 from ..temporal.trajectory import Trajectory
 from ..threads import one_thread
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .critical import compare_critical
 from .kept import PartStore, Plain, float_of, growth_data, growth_of, pair_of, perturbation_data, perturbation_of
+from .pairs import TOGETHER
 from .perturbation import modes_as_in_time, perturb, perturbation_step
-from .result import Agreement, Comparison, Critical, judge, likeness, overall
+from .result import Agreement, Comparison, Critical, decays_as_none, judge, likeness, overall
 from .settled import SettledVelocity, last_rate, settled, settled_of
 from .shapes import by_body, mode_shape, span_assurance
 from .small_motion import Perturbation, whole
@@ -37,7 +38,6 @@ from .small_motion import Perturbation, whole
 T = TypeVar("T")
 PARTS = ("growth", "run", "critical")
 LEAST_PERIODS = 4.0  # of the dominant line, over which growth is fitted
-TOGETHER = 1e-4  # of |λ|: modes that no signal in time tells apart
 HALVED = 0.5  # of a difference: what half the step may leave of it where it comes of the step
 NEAR = 0.05  # of the frequency: within it an unstable mode responds
 
@@ -229,8 +229,10 @@ class _At:
             mu, len(unstable) > 0, here, perturbation, frequency, rate, told, shape, shape_asked=bodies,
             last=_last(modes, self.limit),
         )  # fmt: skip
-        if agrees is False and not diverges:
-            verdict, agrees = self._resolved(mu, here, perturbation, verdict, own)
+        # Beside a double root a step moves the roots of what it marches by the root of its error.
+        foreign = agrees is None and decays_as_none(perturbation, frequency, rate) and not len(unstable)
+        if (agrees is False or foreign) and not diverges:
+            verdict, agrees = self._resolved(mu, here, perturbation, verdict, own, agrees)
         return Comparison(
             mu=mu,
             modal_eigenvalue=here,
@@ -250,18 +252,19 @@ class _At:
         )
 
     def _resolved(
-        self, mu: float, here: complex, coarse: Perturbation, verdict: str, modes: ComplexModes | None
-    ) -> tuple[str, bool | None]:
-        """A verdict that both disagree, held against half the time step: where that takes half of the difference away,
-        the step parts them, and nothing is decided."""
+        self, mu: float, here: complex, coarse: Perturbation, verdict: str, modes: ComplexModes | None,
+        agrees: bool | None,
+    ) -> tuple[str, bool | None]:  # fmt: skip
+        """A verdict that both disagree, or that what decays in time is no mode, held against half the time step: where
+        that takes half of the difference away, the step parts them, and nothing is decided."""
         step = perturbation_step(self.system, self.settings)
         finer = replace(self.settings, step=step / 2)
         try:
             fine = perturb(self.system, mu, settings=finer, max_frequency_hz=self.limit, modes=modes)
         except AnalysisError:
-            return verdict, False
+            return verdict, agrees
         if not fine.shows or abs(fine.eigenvalue - here) > HALVED * abs(coarse.eigenvalue - here):
-            return verdict, False
+            return verdict, agrees
         return (
             f"{verdict}; with half the step of {step:.4g} s growth in time is {readable(fine.growth_rate, 4)} 1/s of "
             f"{readable(here.real, 4)}: the step parts them, take temporal.step = {step / 8:.2g} or less"
@@ -394,8 +397,9 @@ def dominant_response(run: Trajectory, max_frequency_hz: float) -> tuple[float |
     """Dominant frequency [Hz] of the last phase and the growth of that line.
 
     Taken from the velocity of the first watched point (what a body radiates follows velocity); without a
-    watched point from the slip speed of the first contact. The spectrum is that of the second half. No growth is
-    given where it could be fitted over less than LEAST_PERIODS of that line.
+    watched point from the slip speed of the first contact. The spectrum is that of the second half; no frequency is
+    given where something stronger than any line of it swings in fewer than some three periods (`strongest_line`). No
+    growth is given where it could be fitted over less than LEAST_PERIODS of that line.
     """
     if not run.phases or not len(run.time):
         return None, None
@@ -417,8 +421,7 @@ def dominant_line(
     """Frequency [Hz] of the largest line in the last share of a signal (k,) sampled every ``sampling`` [s], and the
     growth of that line over all of it, as `dominant_response` has them; None for what there is not."""
     filtered = low_passed(signal, sampling, max_frequency_hz)
-    spec = spectrum(filtered[int(len(filtered) * (1.0 - share)) :], sampling)
-    frequency, amplitude = spec.line()
+    frequency, amplitude = strongest_line(filtered[int(len(filtered) * (1.0 - share)) :], sampling)
     if amplitude == 0.0:
         return None, None
     fitted = growth(filtered, sampling, frequency)

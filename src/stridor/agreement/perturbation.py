@@ -9,6 +9,7 @@ eigenvalues: if they were wrong, the motion would take on other frequencies and 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -28,6 +29,7 @@ from ..temporal.signals import low_passed
 from ..temporal.simulate import plan, simulate
 from ..threads import one_thread
 from ..typing import Array, ComplexArray, IntArray, Sparse
+from .pairs import second_of, silent_pairs, slip_of
 from .shapes import component_shape, node_rows
 from .small_motion import DIED, LINEAR, PERTURBATION, Perturbation, linear_parts, small_until, whole
 from .told import ABOVE, certain, told
@@ -44,6 +46,7 @@ MOST_WORK = 2e9  # steps times freedoms: what a march may take to become longer
 WATCHED = 100  # nodes of the bodies whose motion gives shapes
 MOST_BYTES = 128e6  # of their motion
 MOST_INSTANTS = 4096  # of it in a shape
+SILENT = "the contacts show nothing of a small motion in time"
 
 
 def options_in_time(system: System, asked: Options | None = None) -> Options:
@@ -77,7 +80,8 @@ def perturb(
 
     It starts with modes up to ``max_frequency_hz``, of contact as it is in time, in equal measure, 1e-5 of the slip
     speed in all, so that frequencies out of range, which may grow faster, start from nothing; the time scheme alone
-    decides what becomes of them. It is used as long as it stays below 2 % of the slip speed, where friction is still
+    decides what becomes of them. Of two that are one, and in which no contact slips, it starts with what else moves at
+    their root (`second_of`). It is used as long as it stays below 2 % of the slip speed, where friction is still
     linear. Where parts of it do not tell the same, a march four times as long follows, unless ``duration`` [s] is given
     and as long as its cost is bounded; what is not told by then is ``untold``. sign: whether it grows is enough. modes:
     `modes_as_in_time`, where they are known. shape: also how nodes move in the fastest component. Raises AnalysisError
@@ -96,7 +100,14 @@ def perturb(
     assert found.right is not None, "asked for with vectors"
     lam, vectors = found.eigenvalues[0, chosen], found.right[0, chosen]
     speed = np.linalg.norm(slip, axis=1)
-    start, moved = _in_equal_measure(nodes, lam, vectors)
+    pairs = silent_pairs(nodes, lam, vectors)
+    single = np.setdiff1d(np.arange(len(lam)), [other for _, other in pairs])
+    options = options_in_time(system)
+    seconds = {
+        int(np.searchsorted(single, one)): second_of(system, mu, complex(lam[one]), vectors[one], options)
+        for one, _ in pairs
+    }
+    start, moved = _in_equal_measure(nodes, lam[single], vectors[single], seconds)
     start *= PERTURBATION * speed[speed > 0.0].min() / len(chosen)
     step = perturbation_step(system, settings)
     top = _top(found, max_frequency_hz)
@@ -118,6 +129,8 @@ def perturb(
         run = whole(simulate(watched, [_as_steady(system, length)], quiet, mu=mu, disturbance=disturbance))
         moving = run.velocity[:, : len(leaders), 0]
         signals = linear_parts(moving, speed[leaders])
+        if np.abs(moving).max(initial=0.0) <= DIED * PERTURBATION * speed[leaders].min():
+            signals = signals[:0]  # rounding of the steady motion, which has any frequency and any rate
         band, limit = told(signals, run.sampling, max_frequency_hz, top)
         sure = certain(signals, run.sampling, limit, band, sign=sign)
         left = small_until(moving, speed[leaders]) < len(moving)
@@ -128,12 +141,14 @@ def perturb(
             break
         length = min(LONGER * length, longest)
     form = None
-    if shape and bodies.shape[0]:  # a system of matrices has no bodies whose shapes could be told
+    if shape and bodies.shape[0] and len(signals):  # a system of matrices has no bodies whose shapes could be told
         part = slice(0, len(signals), max(1, len(signals) // MOST_INSTANTS))
         motion = run.velocity[part, len(leaders) :].reshape(-1, bodies.shape[0])
         form = component_shape(bodies, run.time[part], motion, band.eigenvalues, band.fastest, limit, lam)
     signal = signals[:, 0] if signals.size else np.zeros(0)
     why = "" if sure else _too_short(len(signal) * run.sampling, lam, left=left)
+    if not (len(signal) or left):
+        why = SILENT
     return Perturbation(mu, band.fastest, signal, run.sampling, band, form, why, left, grown)
 
 
@@ -183,19 +198,29 @@ def _lengths(lam: ComplexArray, usual: float, top: float, affordable: float) -> 
     return float(min(max(usual, turned[lam.real * turned > np.log(DIED)].max(initial=0.0)), longest)), longest
 
 
-def _in_equal_measure(nodes: ContactNodes, lam: ComplexArray, vectors: ComplexArray) -> tuple[Array, Array]:
+def _in_equal_measure(
+    nodes: ContactNodes, lam: ComplexArray, vectors: ComplexArray, seconds: Mapping[int, ComplexArray] | None = None
+) -> tuple[Array, Array]:
     """Displacement, velocity and acceleration (3, n) of modes, each with a largest slip speed of one, and how fast in
-    all each contact node (m,) slips in them at most."""
+    all each contact node (m,) slips in them at most. seconds: by the number of a mode w (n,) of (w + t v) e^{λt}, which
+    starts in its place."""
     total, moved = np.zeros((3, vectors.shape[1])), np.zeros(nodes.count)
     for number, (value, vector) in enumerate(zip(lam, vectors, strict=True)):
-        motion = np.linalg.norm(np.abs(value * (nodes.tangent @ vector)).reshape(nodes.count, -1), axis=1)
+        second = None if seconds is None else seconds.get(number)
+        speed = value * vector if second is None else value * second + vector
+        motion = slip_of(nodes, speed)
         peak = float(motion.max())
         # Modes that do not slip would need a huge amplitude to show in the slip speed; leave them out.
-        if peak < 1e-6 * abs(value) * float(np.abs(vector).max()):
+        if peak < 1e-6 * float(np.abs(speed).max()):
             continue
         # Phases spread by the golden angle, so that nothing adds up at the start.
-        scaled = vector / peak * np.exp(2.399963j * number)
-        total += np.real([scaled, value * scaled, value**2 * scaled])
+        turned = np.exp(2.399963j * number) / peak
+        scaled = vector * turned
+        if second is None:
+            total += np.real([scaled, value * scaled, value**2 * scaled])
+        else:
+            other = second * turned
+            total += np.real([other, value * other + scaled, value**2 * other + 2 * value * scaled])
         moved += motion / peak
     return total, moved
 

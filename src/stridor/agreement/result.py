@@ -258,7 +258,8 @@ def _judged(
         )
     said = "unstable" if unstable else "stable"
     if not perturbation.shows:
-        return None, f"μ = {mu:g}: modal says {said}, but the signal in time shows no vibration to compare with"
+        why = perturbation.untold or "the signal in time shows no vibration to compare with"
+        return None, f"μ = {mu:g}: modal says {said}, but {why}"
     turns = len(perturbation.signal) * perturbation.sampling * here.imag / (2 * np.pi)
     if unstable and 0.0 < turns < TURNS and perturbation.left:
         return None, (
@@ -294,6 +295,12 @@ def _judged(
         f"{readable(here.real, 4, decimals=1)} against {readable(perturbation.growth_rate, 4, decimals=1)} 1/s "
         f"({100 * rate:.2g} %)"
     )
+
+
+def decays_as_none(perturbation: Perturbation, frequency: float, rate: float) -> bool:
+    """Whether what is told in time decays otherwise than the nearest mode: frequency and rate are off by as much."""
+    told = perturbation.shows and not perturbation.untold and not perturbation.grows
+    return told and not (frequency <= GOOD_FREQUENCY and rate <= SAME_DECAY)
 
 
 def _vibration(lam: complex) -> str:

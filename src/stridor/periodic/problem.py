@@ -115,8 +115,8 @@ class Family:
         backwards = nodes.slip_velocity(motion.full)[:, 0] < 0.0
         ways = np.where(backwards & ~np.isnan(nodes.area), -1.0, 1.0)  # those of points are their tangents
         return SlidingProblem(
-            float(mu), basis, pairs, Piece(0.0, horizon, loads, displacements), weight.T @ u, status, self.speeds,
-            nodes.names, ways,
+            float(mu), basis, pairs, Piece(0.0, horizon, loads, displacements, horizon), weight.T @ u, status,
+            self.speeds, nodes.names, ways,
             np.vstack([np.zeros((0, system.size)), *free]) @ basis.vectors,
             np.vstack([np.zeros((0, len(motion.names))), *lift]), names,
         )  # fmt: skip

@@ -30,7 +30,7 @@ class Bench(NamedTuple):
     """What does not change with the status: rows (m, k) of normals and tangents with their lifts (m, p), products of
     them (m, 3) nn, tt, nt, compliance, friction coefficients (m,), whether a contact can stop along its tangent at all,
     inertia (p, k) of supports; polynomials of σ (p, T) of their displacements and (p, T) speeds [m/s], when the piece
-    of the schedule begins and how long it is [s]."""
+    of the schedule begins and what σ counts in [s]."""
 
     normal: Array
     tangent: Array

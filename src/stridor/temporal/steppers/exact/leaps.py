@@ -201,5 +201,5 @@ def _bench(motion: Motion) -> Bench:
         tangent_lift=plain(pairs.tangent_lift), products=np.stack([nn, tt, nt], axis=1),
         compliance=plain(pairs.compliance), sliding=plain(pairs.sliding), sticking=plain(pairs.sticking),
         stops=plain(stops), inertia=plain(pairs.inertia), places=plain(piece.displacements),
-        speeds=plain(piece.displacements @ piece.derivative), begin=piece.start, length=piece.end - piece.start,
+        speeds=plain(piece.displacements @ piece.derivative), begin=piece.start, length=piece.unit,
     )  # fmt: skip

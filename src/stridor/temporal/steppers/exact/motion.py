@@ -205,10 +205,9 @@ class Motion:
 
     def fastest(self) -> float:
         """What the length of a moment is told by [1/s]: the fastest of all modes met, or else the phase."""
-        piece = self.pieces[self.piece]
         own = float(np.sqrt(np.abs(self.basis.stiffness).max(initial=0.0)))
         met = [r.fastest for r in self._regimes.values() if "modes" in vars(r)]
-        return max(own, *met, 1.0 / (piece.end - piece.start))
+        return max(own, 0.0, *met) if own or met else 1.0 / self.pieces[self.piece].unit
 
     def _land(self, c: int, moment: float) -> bool:
         """Contact ``c`` closes, which was thrown off within a ``moment`` [s], and all that are closed or were thrown

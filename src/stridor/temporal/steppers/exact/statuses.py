@@ -326,7 +326,7 @@ class Flow(Driven):
 
     def __init__(self, regime: Regime, piece: Piece) -> None:
         super().__init__(regime, piece)
-        self.split = split = regime.slower_than(RAMP / (piece.end - piece.start) if piece.terms > 2 else 0.0)
+        self.split = split = regime.slower_than(RAMP / piece.unit if piece.terms > 2 else 0.0)
         z, w, scale = regime.free
         self.z, self.scale = z, scale
         lifted = regime.back @ self.holds
