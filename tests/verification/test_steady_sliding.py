@@ -168,3 +168,70 @@ def test_a_stop_that_stays_open_needs_no_motion_of_its_own():
         assert found.frequency_hz[0] == pytest.approx([np.sqrt(2.5) / (2 * np.pi)], rel=1e-9)
     with pytest.raises(AnalysisError, match="contact stop does not slide: no support moves"):
         st.modes(case(0.1))
+
+
+def grazing(at_rest: str = "") -> st.Case:
+    """A mass pressed on a belt, and one beside it that nothing presses on its own: springs (1, ½), half of one more
+    along each axis between them, contact of ½, so that the two modes it has when it touches part with any friction."""
+    flat = {"type": "obstacle", "shape": "flat", "normal": (0, 1), "sliding": {"velocity": (1, 0)}}
+    spring = {"between": ("grazes", "ground")}
+    friction = {"law": "coulomb", "coefficient": 0.3}
+    return st.Case(
+        units="nondimensional",
+        bodies={
+            "pressed": {"type": "mass", "mass": 1.0, "position": (5, 0)}, "under": flat | {"point": (5, 0)},
+            "grazes": {"type": "mass", "mass": 1.0, "position": (0, 0)}, "beside": flat | {"point": (0, 0)},
+        },
+        springs={
+            "x": spring | {"direction": (1, 0), "stiffness": 1.0}, "y": spring | {"direction": (0, 1), "stiffness": 0.5},
+            "across": spring | {"direction": (1, -1), "stiffness": 0.1},
+            "own": {"between": ("pressed", "ground"), "direction": (1, 0), "stiffness": 9.0},
+            "up": {"between": ("pressed", "ground"), "direction": (0, 1), "stiffness": 9.0},
+        },
+        loads={"press": {"at": "pressed", "force": (0, -3)}} | ({at_rest: {"at": "grazes", "force": (0, -0.1)}} if at_rest else {}),
+        contacts={
+            "rub": {"slave": "pressed", "master": "under", "stiffness": 1.0, "friction": friction},
+            "graze": {"slave": "grazes", "master": "beside", "stiffness": 0.5, "friction": friction},
+        },
+        modal={"max_frequency_hz": 2.0, "friction_range": (0.0, 1.0)},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("source", ["krylov", "full", "reduced"])
+def test_a_contact_that_carries_nothing_feeds_no_motion(source):
+    open_, closed = (st.modes(case.with_({"modal.source": source}), mu=0.3) for case in (grazing(), grazing("more")))
+    assert open_.open_contacts == ("graze",)
+    assert not open_.unstable.any()
+    assert closed.open_contacts == ()
+    assert closed.unstable.sum() == 1
+    stiffness = np.array([[1.05, -0.05], [-0.05, 0.55]])
+    free = np.sqrt(np.linalg.eigvalsh(stiffness)) / (2 * np.pi)
+    for frequency in free:
+        assert np.abs(open_.frequency_hz[0] - frequency).min() < 1e-9
+    assert not st.onsets(grazing().with_({"modal.source": source})).onsets
+
+
+def test_a_contact_that_carries_nothing_hides_no_other_equilibrium():
+    """A mass whose springs and contact have two equilibria with much friction, alone and beside one that only grazes."""
+    rng = np.random.default_rng(4)
+    several = 0
+    for _ in range(40):
+        half, rows = rng.normal(size=(4, 4)), rng.normal(size=(2, 3, 4))
+        stiffness = np.zeros((5, 5))
+        stiffness[:4, :4], stiffness[4, 4] = half @ half.T + np.eye(4), 1.0
+        normal, tangent = np.zeros((2, 4, 5))
+        normal[:3, :4], tangent[:3, :4] = rows
+        normal[3, 4] = 1.0
+        force = np.append(rng.normal(size=4), 0.0)
+        given = np.eye(5), np.zeros((5, 5)), stiffness
+        alone, beside = (
+            by_hand(*given, normal[:count], tangent[:count], 2.0, loads={"f": force}, slip=-1.0) for count in (3, 4)
+        )
+        try:
+            found = [st.steady_sliding(system, mu=1.5) for system in (alone, beside)]
+        except AnalysisError:
+            continue
+        forces = [sorted(o.normal_force[:3].round(9).tolist() for o in (f, *f.others)) for f in found]
+        assert forces[0] == forces[1]
+        several += len(forces[0]) > 1
+    assert several > 3

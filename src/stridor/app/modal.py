@@ -179,7 +179,8 @@ def onsets(
                 "--source": source,
             }
             for option in [option for option, value in given.items() if value]:
-                raise CaseError(option, None, f"is not for onsets along {name}: {NOT_ALONG[option]}")
+                where = "modal.damped" if option == "--undamped" and not undamped else option
+                raise CaseError(where, None, f"is not for onsets along {name}: {NOT_ALONG[option]}")
             _onsets_along(call, loaded, name, None if between is None else range_of(between, "--between"))
             return
 

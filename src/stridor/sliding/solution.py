@@ -33,6 +33,7 @@ from .resultants import Balance, Resultant, balance, resultants
 ALL_TRIED = 5  # nodes of which it is looked whether other sets are in equilibrium as well
 PRESSED = 1e-12  # of the largest force on a freedom: contact forces no larger are rounding of it
 ROUNDING = 1e-14  # of the displacement that the largest contact force gives the stiffest freedom
+UNLOADED = 1e-9  # of the largest contact force: what is none
 SIGN_CHANGES = 30
 MOST = 100_000  # unknowns of all sets of nodes that are tried where one of them does not hold the structure
 STEADY = "steady sliding of nodes"
@@ -298,6 +299,9 @@ def other_equilibria(system: System, found: SteadySliding, mu: float | None = No
 
 def _others(system: System, found: SteadySliding, mu: float | None, free: IntArray) -> list[OtherEquilibrium]:
     others, nodes = list[OtherEquilibrium](), system.contact_nodes()
+    stiffest = float(np.abs(system.stiffness.data).max(initial=0.0))
+    # One that differs in contacts without force and gap is the same.
+    known = {_loaded(found).tobytes()}
     for active in sets_near(found.active, free):
         if np.array_equal(active, found.active):
             continue
@@ -305,16 +309,25 @@ def _others(system: System, found: SteadySliding, mu: float | None, free: IntArr
             held = steady_sliding(system, mu=mu, held=active)
         except AnalysisError:
             continue
-        force, gap, own = held.normal_force[free], held.gap[free], active[free]
-        # One that differs in contacts without force and gap is the same. All gaps may be none but for rounding.
         largest = float(np.abs(held.normal_force).max(initial=0.0))
-        stiffest = float(np.abs(system.stiffness.data).max(initial=0.0))
+        # All gaps may be none but for rounding.
         rounding = ROUNDING * largest / stiffest if stiffest else 0.0
-        pushes = force[own] > 1e-9 * largest
-        if pushes.all() and np.all(gap[~own] > max(1e-9 * float(np.abs(gap).max(initial=0.0)), rounding)):
-            names = tuple(dict.fromkeys(nodes.names[k] for k in nodes.owner[active]))
-            others.append(OtherEquilibrium(active, held.normal_force, names))
+        overlaps = max(1e-9 * float(np.abs(held.gap[free]).max(initial=0.0)), rounding)
+        force, gap, own = held.normal_force[free], held.gap[free], active[free]
+        if np.any(force[own] < -UNLOADED * largest) or np.any(gap[~own] < -overlaps):
+            continue
+        loaded = _loaded(held)
+        if loaded.tobytes() not in known:
+            known.add(loaded.tobytes())
+            names = tuple(dict.fromkeys(nodes.names[k] for k in nodes.owner[loaded]))
+            others.append(OtherEquilibrium(loaded, held.normal_force, names))
     return others
+
+
+def _loaded(found: SteadySliding) -> BoolArray:
+    """Nodes (m,) that carry more than rounding of the others' forces."""
+    force = np.abs(found.normal_force)
+    return found.active & (force > UNLOADED * float(force.max(initial=0.0)))
 
 
 def steady_nodes(

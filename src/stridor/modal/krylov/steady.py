@@ -16,6 +16,7 @@ from ...sliding import (
     anything_acts,
     friction_damping_matrix,
     full_motion,
+    least_force,
     require_pressed,
     steady_nodes,
     steady_sliding,
@@ -111,7 +112,9 @@ def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver
         require_pressed(system, steady.normal_force)
         if not system.load_steps:
             none = np.zeros(nodes.count, dtype=bool)
-            return TouchingNodes(steady.active, steady.sense, none, force=steady.normal_force)
+            # One that only rounding presses may as well be open, and no friction is in it that could feed a motion.
+            active = steady.active & (nodes.kept | (steady.normal_force > least_force(system)))
+            return TouchingNodes(active, steady.sense, none, force=steady.normal_force)
         stuck, still = steady.active & (steady.status == STICK), int(steady.slips_still.sum())
         closed, slips = int(steady.active.sum()), int((steady.status == SLIP).sum())
         limit = f" ({still} of them at their limit without a slip velocity, taken as sliding)" if still else ""
