@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 from browsing import PATIENT, READY, SOLVED, WITH_BROWSER, expect, number, page_at, serving, shot, slide, wait
+from page_programs import HUGE_CASE
 
 import stridor as st
 from program import stridor
@@ -197,7 +198,7 @@ def test_a_broken_file_is_refused_as_on_the_command_line(page: Any, tmp_path: Pa
     wait(page, "document.querySelector('[data-number=\"bodies.beam1.angle_deg\"]').value === '84'")
     expect(problem).to_be_hidden()
     huge = tmp_path / "huge.toml"  # of good numbers, but nothing that could be computed with
-    huge.write_text(HUGE.text, encoding="utf-8")
+    huge.write_text(HUGE_CASE, encoding="utf-8")
     page.set_input_files("input[type=file]", huge)
     expect(problem).to_contain_text("makes 6.0e+10 degrees of freedom")
     assert page.input_value('[data-number="bodies.beam1.angle_deg"]') == "84"

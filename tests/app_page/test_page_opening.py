@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from page_programs import HUGE_CASE
 
 from stridor.app.page.bench import Bench
 from stridor.app.page.session import Session
@@ -15,11 +16,7 @@ from stridor.case import template_text
 
 BEAMS = Source.template("two-beams")
 OTHER = Source("other.toml", template_text("two-beams") + "\n# other\n")
-HUGE = Source("huge.toml", """
-materials.a = { young_modulus = 2e9, density = 2000.0, poisson_ratio = 0.3 }
-bodies.b = { type = "solid", model = "plane strain", material = "a", thickness = 0.01, mesh = { shape = "rectangle", corner = [0.0, 0.0], size = [0.1, 0.02], divisions = [100000, 100000] } }
-supports.s = { at = "b.bottom", fixed = ["x", "y"] }
-""")  # fmt: skip
+HUGE = Source("huge.toml", HUGE_CASE)
 
 
 class Asked:
