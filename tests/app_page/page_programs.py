@@ -8,6 +8,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+# Of good numbers, but with more freedoms than can be computed with.
+HUGE_CASE = """
+materials.a = { young_modulus = 2e9, density = 2000.0, poisson_ratio = 0.3 }
+bodies.b = { type = "solid", model = "plane strain", material = "a", thickness = 0.01, mesh = { shape = "rectangle", corner = [0.0, 0.0], size = [0.1, 0.02], divisions = [100000, 100000] } }
+supports.s = { at = "b.bottom", fixed = ["x", "y"] }
+"""
+
 
 def counting() -> Callable[[Any, Callable[[str, Any], None]], None]:
     """Answers a number of seconds after as long, which a newer question may interrupt; "die" ends the process."""

@@ -16,6 +16,7 @@ from typing import Any
 
 import pytest
 from browsing import PATIENT, READY, SOLVED, WITH_BROWSER, expect, number, page_at, serving, shot, slide, wait
+from page_programs import HUGE_CASE
 
 import stridor as st
 from program import stridor
@@ -196,15 +197,29 @@ def test_a_broken_file_is_refused_as_on_the_command_line(page: Any, tmp_path: Pa
     page.set_input_files("input[type=file]", mended)
     wait(page, "document.querySelector('[data-number=\"bodies.beam1.angle_deg\"]').value === '84'")
     expect(problem).to_be_hidden()
+    huge = tmp_path / "huge.toml"  # of good numbers, but nothing that could be computed with
+    huge.write_text(HUGE_CASE, encoding="utf-8")
+    page.set_input_files("input[type=file]", huge)
+    expect(problem).to_contain_text("makes 6.0e+10 degrees of freedom")
+    assert page.input_value('[data-number="bodies.beam1.angle_deg"]') == "84"
+    slide(page, "mu", 0.3)
+    wait(page, f"stridor.state.at.mu === 0.3 && {SOLVED}")
+    expect(page.locator("#st-title")).to_contain_text("Two beams")
+    expect(page.locator("#st-said")).to_contain_text("Growth begins")
 
 
 def test_a_number_that_is_refused_is_said_and_taken_back(page: Any):
     slide(page, "loads.press.force.1", 20.0)
     page.locator("#st-problem").wait_for(state="visible", timeout=PATIENT)
-    expect(page.locator("#st-problem")).to_contain_text("pull")
+    with pytest.raises(st.AnalysisError) as refused:
+        st.modes(st.loads(template_text("two-beams"), ["loads.press.force.1=20.0"]), check=False)
+    expect(page.locator("#st-problem")).to_have_text(str(refused.value))
+    expect(page.locator("#st-said")).to_contain_text("Of the last numbers that could be computed: ")
+    expect(page.locator("#st-modes-said")).to_contain_text("Of the last numbers that could be computed. ")
     page.get_by_role("button", name="Undo").click()
     wait(page, "document.querySelector('[data-number=\"loads.press.force.1\"]').value === '-20'")
     page.locator("#st-problem").wait_for(state="hidden", timeout=PATIENT)
+    expect(page.locator("#st-modes-said")).not_to_contain_text("Of the last numbers")
 
 
 def test_a_link_restores_the_state_and_the_file_has_it(page: Any, browser: Any):

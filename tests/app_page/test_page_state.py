@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import tomllib
 import zlib
 from dataclasses import replace
 from pathlib import Path
@@ -132,6 +133,14 @@ def test_a_broken_case_is_refused_in_the_words_of_the_command_line(tmp_path: Pat
         checked(Source("broken.toml", text))
     assert str(by_page.value) == str(by_file.value)
     assert "bodies.beam1.length" in str(by_page.value)
+
+
+def test_a_key_that_would_take_for_ever_is_refused_before_the_text_is_read(monkeypatch: pytest.MonkeyPatch):
+    """Reading 20 000 parts takes half a minute, in which the server answers nobody."""
+    monkeypatch.setattr(tomllib, "loads", lambda _: pytest.fail("the text was read"))
+    with pytest.raises(st.CaseError) as caught:
+        checked(Source("bomb.toml", "a." * 20_000 + "a = 1"))
+    assert str(caught.value) == "bomb.toml, line 1: a key of tables that are nested too deeply"
 
 
 def test_the_levers_of_the_two_beams():

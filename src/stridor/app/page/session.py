@@ -55,6 +55,8 @@ class Session:
         self._runs: list[Run] = []
         self._ending = threading.Lock()
         self._moving: object = None
+        self._opening: tuple[int, State] | None = None  # question and state of a case that is not on the page yet
+        self._given_up: set[int] = set()  # questions of those that never came to be on it
         self.picture = Picture()
         self.heard = 0  # number of the newest move of the page that has come here
         self.folder = new_folder()
@@ -101,7 +103,8 @@ class Session:
         self._listeners.append(callback)
 
     def on_picture(self, callback: Callable[[str, Any], None]) -> None:
-        """Call back with every piece of the picture: its name and its content."""
+        """Call back with every piece of the picture: its name and its content; "declined": why a case that was to be
+        opened is not on the page."""
         self._viewers.append(callback)
 
     def on_end(self, callback: Callable[[], None]) -> None:
@@ -142,23 +145,28 @@ class Session:
     def look(self, tab: str) -> None:
         """At another tab; nothing is computed for that."""
         self._history.now = replace(self.state, tab=tab)
-        for listener in list(self._listeners):
-            listener()
+        if self._opening is not None:
+            self._opening = self._opening[0], replace(self._opening[1], tab=tab)
+        self._listened()
 
     def reset(self) -> None:
         """All numbers as the case was opened."""
         self.go(replace(first_state(self.state.source), tab=self.state.tab))
 
     def open(self, source: Source) -> None:
-        """Another case in place of this one. Raises CaseError, and the page stays as it is."""
-        self.go(replace(first_state(source), tab=self.state.tab))
+        """Another case in place of this one, once its model is built: until then, and where that is refused, the page
+        stays as it is. Raises CaseError where reading it is enough to refuse it."""
+        self._try_out(replace(first_state(source), tab=self.state.tab))
 
     def restore(self, link: str) -> None:
-        """The state of a link. Raises CaseError, and the page stays as it is."""
+        """The state of a link; one of another case takes the place of this one as with `open`. Raises CaseError, and
+        the page stays as it is."""
         state = from_link(link, self._own)
         state.case()
         if state == self.state:
             self._changed()  # a page that has just been opened: nothing is computed yet
+        elif state.source != self.state.source:
+            self._try_out(state)
         else:
             self.go(state)
 
@@ -175,8 +183,12 @@ class Session:
             self._changed()
 
     def compute(self) -> None:
-        """Ask for the picture of the state."""
+        """Ask for the picture of the state. A case that is being opened is given up for it: the newest wins."""
         self.picture.number = self._worker.ask(self.state)
+        if self._opening is not None:
+            self._given_up.add(self._opening[0])
+            name = self._opened().source.name
+            self._tell("declined", f"{name} was not opened: something else was asked for before its model was built")
 
     def started(self, run: Run) -> None:
         """A run of this page, which ends with it."""
@@ -213,10 +225,52 @@ class Session:
 
     # -- inside ---------------------------------------------------------------------------------------------------
 
-    def _changed(self) -> None:
-        self.compute()
+    def _try_out(self, state: State) -> None:
+        """Build the model of another case, and go to it where that is not refused (`_settled`)."""
+        if state == self.state:
+            if self._opening is not None:
+                self.compute()
+            return
+        if self._opening is not None:
+            self._given_up.add(self._opening[0])
+        self.picture.number = self._worker.ask(state)
+        self._opening = self.picture.number, state
+        self._tell("progress", {"what": f"{state.source.name} is being opened"})
+
+    def _opened(self) -> State:
+        """The state that was being opened, which it is no more."""
+        assert self._opening is not None, "asked for where there is one"
+        state, self._opening = self._opening[1], None
+        self._tell("progress", {"what": ""})
+        return state
+
+    def _settled(self, part: str, content: Any) -> bool:
+        """With the first that is heard of a case that is being opened: whether it is the page's now. Else the page
+        stays at the one before, whose picture is asked for again, as the process has turned to the other meanwhile."""
+        state = self._opened()
+        if part in ("refused", "failed"):
+            name = f"{state.source.name} was not opened: " if part == "failed" else ""
+            self._given_up.add(self.picture.number)
+            self._changed()
+            self._tell("declined", f"{name}{content}")
+            return False
+        self._moving = None
+        self.picture.parts.clear()
+        self._history.go(state)
+        self._listened()
+        return True
+
+    def _tell(self, part: str, content: Any) -> None:
+        for viewer in list(self._viewers):
+            viewer(part, content)
+
+    def _listened(self) -> None:
         for listener in list(self._listeners):
             listener()
+
+    def _changed(self) -> None:
+        self.compute()
+        self._listened()
 
     def _answered(self, number: int, part: str, content: Any) -> None:
         """A piece of an answer, in the thread that listens."""
@@ -224,6 +278,10 @@ class Session:
 
     def _heard(self, number: int, part: str, content: Any) -> None:
         if self.closed:
+            return
+        if number in self._given_up:
+            return
+        if self._opening is not None and number == self._opening[0] and not self._settled(part, content):
             return
         picture = self.picture
         if part == "done":
@@ -236,8 +294,7 @@ class Session:
         if part == "locus":
             picture.problem = ""
             picture.parts.pop("onsets", None)
-        for viewer in list(self._viewers):
-            viewer(part, content)
+        self._tell(part, content)
 
 
 def refused(call: Callable[[], None]) -> str:

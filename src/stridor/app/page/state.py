@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from ...case import Case, loads, template_text, templates
+from ...case.outsized import deep_line
 from ...case.overrides import apply, split_path
 from ...errors import CaseError
 from ...laws.friction import is_zero
@@ -105,7 +106,10 @@ def checked(source: Source) -> Case:
 
 
 def _files_named(text: str) -> list[str]:
-    """Dotted paths of the files that a text names; none of a text that is no TOML, which says so itself."""
+    """Dotted paths of the files that a text names; none of a text that is no TOML or that reading would take for ever,
+    which `loads` says itself."""
+    if deep_line(text):
+        return []
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError):

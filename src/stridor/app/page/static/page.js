@@ -254,11 +254,12 @@ const stridor = (() => {
     const on = state.onsets;
     let text = "";
     if (state.progress) text = `${state.progress[0].toUpperCase()}${state.progress.slice(1)}.`;
+    else if (state.refused && !state.locus) text = "Nothing could be computed for these numbers.";
     else if (!on) text = state.locus ? "The onsets are being solved." : "The modes are being computed.";
     else if (on.first) text = `Growth begins at μ = ${on.first.mu.toPrecision(5)}, ${hertz(on.first.frequency_hz)} Hz (${on.onsets.length} onset${on.onsets.length === 1 ? "" : "s"} solved).`;
     else text = on.growing_at_start.length ? `Something grows already at μ = ${on.friction_range[0]}.` : `Nothing grows up to μ = ${on.friction_range[1]}.`;
     if (on && !on.complete) text += ` ${on.completeness}`;
-    if (state.refused && state.locus) text = `Of the last numbers that could be computed: ${text[0].toLowerCase()}${text.slice(1)}`;
+    if (state.refused && state.locus && !state.progress) text = `Of the last numbers that could be computed: ${text[0].toLowerCase()}${text.slice(1)}`;
     const box = $("st-said");
     if (box && box.textContent !== text) box.textContent = text;
     document.body.classList.toggle("st-busy", Boolean(busy));
@@ -269,7 +270,7 @@ const stridor = (() => {
     const growing = at.modes.filter((m) => m.unstable).length;
     $("st-modes-title").textContent = `Modes at μ = ${written(at.mu)}`;
     const box_ = $("st-modes-said");
-    box_.replaceChildren(`${at.modes.length} modes, ${growing || "none"} growing. `);
+    box_.replaceChildren(state.refused ? "Of the last numbers that could be computed. " : "", `${at.modes.length} modes, ${growing || "none"} growing. `);
     if (at.said) box_.append(at.said);
     else if (!at.checked) box_.append("Followed from μ = 0, not checked yet.");
     else if (at.completeness) box_.append(element("details", {}, element("summary", {}, at.completeness.split(/[.:]/)[0]), at.completeness));
@@ -336,10 +337,17 @@ const stridor = (() => {
 
   // -- what the server says ----------------------------------------------------------------------------------------
   // What was refused of an answer is over with the next answer; what was refused of a file or a link stays to be read.
-  function unanswered(text) { problem(text); state.refused = true; }
-  function answered() { if (state.refused) problem(""); state.refused = false; }
-  function problem(text) {
+  function unanswered(text) {
+    problem(text);
+    state.answers = state.refused = true;
+    list();
+  }
+  function answered() {
+    if (state.answers) problem("");
     state.refused = false;
+  }
+  function problem(text) {
+    state.answers = false; // whether what is said is of an answer
     const box = $("st-problem");
     box.textContent = text;
     box.hidden = !text;
@@ -357,7 +365,7 @@ const stridor = (() => {
   }
   // Another case is open: nothing of the one before is shown under its name.
   function forget() {
-    Object.assign(state, { locus: null, at: null, onsets: null, shape: null, geometry: null, refused: false });
+    Object.assign(state, { locus: null, at: null, onsets: null, shape: null, geometry: null, refused: false, progress: "" });
     for (const chart of Object.keys(KINDS).map(chartOf)) if (chart) { chart.clear(); chart.drawnWith = null; }
     document.querySelectorAll(".st-mu").forEach((e) => { e.hidden = true; });
     for (const id of ["st-model", "st-modes-list", "st-mode-facts", "st-tornado"]) $(id)?.replaceChildren();
@@ -374,7 +382,7 @@ const stridor = (() => {
       if (c.why) problem(c.why);
     },
     locus(c) { state.locus = c; state.onsets = null; state.progress = ""; answered(); draw(); document.querySelectorAll(".st-mu").forEach((e) => { e.hidden = false; }); stamp("locus"); },
-    at(c) { state.at = c; list(); answered(); stamp("at"); },
+    at(c) { state.at = c; answered(); list(); stamp("at"); },
     onsets(c) { state.onsets = c; draw(); },
     shape(c) {
       if (state.shape?.branch !== c.branch || state.shape?.mu !== c.mu) {
@@ -386,6 +394,7 @@ const stridor = (() => {
     },
     tornado,
     progress(c) { state.progress = c.what; },
+    declined: problem, // a case that is not opened; what is shown is of the one before, and stays
     refused: unanswered, unanswered, failed: unanswered,
   };
   // How often each part was drawn, for measurements: counted when it is on the screen.
