@@ -187,3 +187,11 @@ def test_a_shape_of_another_model_is_not_that_of_the_page():
     for other in (replace(state, mu=0.2), replace(state, branch=7), state.with_change("materials.steel.density", 7900.0)):
         assert not is_of(shape, other)
     assert not is_of({"branch": 8, "missing": "not in the band"}, state)
+
+
+def test_a_file_that_is_no_case_is_told_what_one_is() -> None:
+    """What the picker rejects may be a small picture: its size alone says nothing."""
+    from stridor.app.page.layout import TOO_LARGE
+
+    assert "TOML" in TOO_LARGE
+    assert "at most 5 MB" in TOO_LARGE

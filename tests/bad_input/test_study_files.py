@@ -13,6 +13,7 @@ from program import stridor
 from stridor.case import template_text
 from stridor.errors import CaseError
 from stridor.io.claims import claimed
+from stridor.studies.checks import negative_friction
 
 pytestmark = pytest.mark.bad_input
 FEW = ["bodies.beam1.elements=3", "bodies.beam2.elements=6", "modal.max_frequency_hz=3e3"]
@@ -74,6 +75,65 @@ def test_one_message_says_what_is_wrong(case: st.Case, tables: dict, words: str)
     assert words in str(told.value)
     assert len(told.value.problems) == 1
     assert "pydantic" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("matrix", "said"),
+    [
+        (((1.0, 0.7), (0.6, 1.0)), "0.7 and 0.6' – must be symmetric: row 1, column 2 and row 2, column 1"),
+        (((1.0, 0.7), (0.7, 0.9)), "0.9 – must be 1, as all of the diagonal: row 2, column 2 is of a number with itself"),
+        (((1.0, 1.5), (1.5, 1.0)), "[[1.0, 1.5], [1.5, 1.0]] – must be positive definite; its least eigenvalue is -0.5:"),
+    ],
+)
+def test_correlations_tell_what_is_wrong_with_them(case: st.Case, matrix: tuple, said: str) -> None:
+    parameters = {DENSITY: NORMAL, "bodies.beam1.thickness": {**NORMAL, "low": 1.0}}
+    with pytest.raises(CaseError) as told:
+        st.Study(
+            case=case, parameters=parameters, sampling=RANDOM,
+            correlation={"of": tuple(parameters), "matrix": matrix},
+        )  # fmt: skip
+    assert str(told.value).startswith("correlation.matrix: ")
+    assert said in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("path", "varied", "said"),
+    [
+        ("mu", {"range": (-0.3, 0.1)}, "parameters.mu.range: [-0.3, 0.1] – a friction coefficient is a finite number ≥ 0"),
+        ("mu", {"values": (0.1, -0.1)}, "parameters.mu.values: [0.1, -0.1] – a friction"),
+        ("mu", {**NORMAL, "low": -1.0}, "parameters.mu.low: -1.0 – a friction"),
+        ("mu", {"distribution": "normal", "mean": 0.3, "deviation": 0.1}, "parameters.mu.low: missing – a friction"),
+        ("contacts.A.friction.coefficient", {"distribution": "uniform", "range": (-0.1, 0.1)}, "[-0.1, 0.1] – a friction"),
+    ],
+)  # fmt: skip
+def test_friction_that_may_be_negative_is_refused_before_any_row(
+    tmp_path: Path, case: st.Case, path: str, varied: dict, said: str
+) -> None:
+    study = st.Study(case=case, parameters={path: varied}, sampling=RANDOM)
+    with pytest.raises(CaseError) as told:
+        st.run_study(study, tmp_path / "out", workers=1)
+    assert said in str(told.value)
+    assert not (tmp_path / "out" / "study.zarr").exists()
+
+
+def test_what_keeps_a_model_away_is_said_of_the_parameter(tmp_path: Path, case: st.Case) -> None:
+    path = "contacts.A.friction.coefficient"
+    parameters = {"mu": {"range": (0.0, 0.3)}, path: {"range": (0.0, 0.3)}}
+    study = st.Study(case=case, parameters=parameters, sampling=RANDOM, answers={"source": "reduced"})
+    with pytest.raises(CaseError) as told:
+        st.run_study(study, tmp_path / "out", workers=1)
+    assert str(told.value).startswith(f"parameters.{path}: give a range of mu")
+
+
+@pytest.mark.parametrize(
+    "varied",
+    [
+        {"range": (0.0, 0.1)}, {"values": (0.0, 0.1)}, {**NORMAL, "low": 0.0}, {**NORMAL, "deviation": 0.1},
+        {**NORMAL, "distribution": "log-normal"}, {**NORMAL, "distribution": "log-normal", "low": -1.0},
+    ],
+)  # fmt: skip
+def test_friction_that_is_nowhere_negative_is_taken(case: st.Case, varied: dict) -> None:
+    assert not negative_friction(st.Study(case=case, parameters={"mu": varied}, sampling=RANDOM))
 
 
 @pytest.mark.parametrize(

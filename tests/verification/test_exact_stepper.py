@@ -25,7 +25,7 @@ from stridor.temporal.schedule import PhaseSpec
 from stridor.temporal.simulate import Settings, plan, simulate
 from stridor.temporal.steppers.exact.leaps import Leaps
 from stridor.temporal.steppers.exact.motion import Motion
-from stridor.temporal.steppers.exact.search import CROSSED, NONE, first_root, numbers_of, parts_of, planes
+from stridor.temporal.steppers.exact.search import CROSSED, NONE, UNDECIDED, first_root, numbers_of, parts_of, planes
 from stridor.temporal.steppers.exact.statuses import STICK as STICKS
 
 pytestmark = pytest.mark.verification
@@ -265,6 +265,27 @@ def test_the_largest_forces_are_those_of_all_times(seed: int):
 def sums(weights: np.ndarray, poles: np.ndarray, rows: np.ndarray, t: np.ndarray) -> np.ndarray:
     """Re Σ w exp(λt) + a + bt (2, k) at times (k,)."""
     return (weights @ np.exp(poles[:, None] * t)).real + rows[:, :1] + rows[:, 1:] * t
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_root_is_found_beside_a_mode_that_grows_beyond_all_numbers_on_the_longest_part():
+    """y = cos t − 1e-6 exp(3000 t): exp(3000) is no number, and what is none decides nothing."""
+    poles, weights, rows = np.array([1j, 3000.0 + 0j]), np.array([[1.0 + 0j, -1e-6]]), np.zeros((1, 1))
+    numbers, start = numbers_of(weights, poles, rows), planes(np.ones(2, dtype=complex))
+    table = parts_of(poles, 1.0)
+    assert all(np.isfinite(part).all() for part in table)
+    code, _, when, *_ = first_root(numbers, planes(poles), start, table, 1.0, 0, np.empty(4))
+    assert code == CROSSED
+    assert when == pytest.approx(math.log(1e6) / 3000.0, rel=1e-6)
+
+
+def test_what_is_no_number_is_no_answer():
+    """A mode that no part is too short for: its amount times its factor is beyond all numbers, and less the same."""
+    poles, rows = np.array([1.0 + 0j, 1.0 + 0j]), np.ones((1, 1))
+    numbers = numbers_of(np.array([[1.0 + 0j, -1.0]]), poles, rows)
+    start = planes(np.full(2, 1.7e308, dtype=complex))
+    code, *_ = first_root(numbers, planes(poles), start, parts_of(poles, 1.0), 1.0, 0, np.empty(4))
+    assert code == UNDECIDED
 
 
 def test_the_first_root_is_the_first():

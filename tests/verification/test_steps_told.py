@@ -108,3 +108,27 @@ def test_only_explicit_steps_that_are_few_are_told() -> None:
         words = coarse(0.1 / highest, Settings(max_frequency_hz=float(highest)), "nodal")
         step = float(words.partition("temporal.step = ")[2].split()[0])
         assert 80.0 * (1 - 1e-9) <= 1.0 / (step * highest) < 90.0
+
+
+def test_a_run_without_contacts_shows_no_table_of_contacts(capsys: pytest.CaptureFixture[str]) -> None:
+    rod = """
+    materials.steel = { young_modulus = 2.0e11, density = 7800.0, poisson_ratio = 0.3 }
+    supports.clamp = { at = "a.start", fixed = ["x", "y", "rotation"] }
+    loads.push = { at = "a.end", force = [0.0, -1.0] }
+    phases = [{ name = "run", duration = 1e-4, loads = { push = 1.0 } }]
+    temporal.watch = ["a.end"]
+    [bodies.a]
+    type = "beam"
+    material = "steel"
+    start = [0.0, 0.0]
+    angle_deg = 0.0
+    length = 0.1
+    width = 0.01
+    thickness = 0.01
+    elements = 2
+    """
+    case = st.loads(rod)
+    show_run(st.summarise(case, st.simulate(case)).to_json())
+    shown = capsys.readouterr().out
+    assert "contact" not in shown
+    assert "steps of" in shown

@@ -25,7 +25,8 @@ def show_run(summary: dict[str, Any]) -> None:
         for name, c in phase["contacts"].items()
     ]
     columns = ["phase", "contact", "max N [N]", "max slip [m/s]", "stick [%]", "slip [%]", "open [%]"]
-    table("contacts", columns, rows, drop=["max slip [m/s]", "stick [%]"], kept_in="simulate.nc")
+    if rows:  # a case may have no contacts
+        table("contacts", columns, rows, drop=["max slip [m/s]", "stick [%]"], kept_in="simulate.nc")
     _show_settled(summary)
     for change in summary["changed"]:
         stdout.print(f"changed in the middle of the run: {change}")

@@ -8,7 +8,7 @@ whose estimate is above the bound and a random share of all are solved in the fu
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -204,6 +204,15 @@ def made(study: Study, case: Case, samples: Array, path: Path) -> FrictionModels
         if study.compute == "modes":
             anchors_noted(model, own, {name: named.get(name, name) for name in study.parameters}, _numbers(location))
     return FrictionModels.read(str(path), case)
+
+
+def in_words_of(study: Study, case: Case, error: CaseError) -> CaseError:
+    """What is wrong with the box of a model, by the parameters that the study has: nobody gave it a box."""
+    named = _named(case)
+    asked = {f"box.{named.get(path, path)}": f"parameters.{path}" for path in study.parameters}
+    if study.compute == "onsets":
+        asked[f"box.{FRICTION}"] = "modal.friction_range"
+    return CaseError.many(replace(item, where=asked.get(item.where, item.where)) for item in error.problems)
 
 
 def _numbers(model: Path) -> Path:

@@ -28,6 +28,7 @@ from ..study.provenance import provenance
 from ..threads import available_cores
 from ..typing import Array, IntArray
 from . import reduced_rows
+from .checks import negative_friction
 from .effect import without_effect
 from .parts import Part
 from .result import StudyResult, open_study
@@ -147,6 +148,8 @@ class _Run:
                 store.note(completed=[*(store.told("completed") or ()), line])
                 self.say(f"warning: {line}")
             return store
+        if problems := negative_friction(self.study):
+            raise CaseError.many(problems)
         values = samples(self.study)
         numbers = np.arange(len(values)) if self.part is None else self.part.numbers(len(values))
         made = provenance(case, "study", 0.0) | {"programs": [program()]}
@@ -214,9 +217,10 @@ class _Run:
             model = reduced_rows.made(self.study, case, values, path)
             why = self._proved(case, values, model)
         except (CaseError, AnalysisError) as error:
+            told = reduced_rows.in_words_of(self.study, case, error) if isinstance(error, CaseError) else error
             if asked:
-                raise
-            return f"there is no reduced model: {error}"
+                raise told from error
+            return f"there is no reduced model: {told}"
         if why and asked:
             raise AnalysisError(why)
         return why

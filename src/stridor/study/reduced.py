@@ -261,8 +261,24 @@ class Numbers:
         if key not in self._built:
             while len(self._built) >= REMEMBERED:
                 del self._built[next(iter(self._built))]
-            self._built[key] = self._checked(build_system(self._case.with_(changes), mu).in_place())
+            self._built[key] = self._checked(build_system(self._varied(changes), mu).in_place())
         return self._built[key]
+
+    def _varied(self, changes: dict[str, float]) -> Case:
+        """The case with values of the box. Raises CaseError, of the end of a range where that is refused as well: what
+        lies between was chosen here, and nobody gave it."""
+        try:
+            return self._case.with_(changes)
+        except CaseError as error:
+            of_box = {path: ends for name, ends in self._box.items() for path in self._changes({name: 0.0})}
+            for item in error.problems:
+                for end in of_box.get(item.where, ()):
+                    try:
+                        self._case.with_({**changes, item.where: float(end)})
+                    except CaseError as at_end:
+                        if any(other.where == item.where for other in at_end.problems):
+                            raise at_end from None
+            raise
 
     def pressed(self, values: Mapping[str, float]) -> System:
         """`system`, with the contact stiffness of the values: what steady sliding is solved on."""

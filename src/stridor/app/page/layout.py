@@ -21,7 +21,7 @@ from .state import LARGEST_TEXT, Source, checked
 if TYPE_CHECKING:
     from .server import Server
 
-TOO_LARGE = f"a case file of at most {LARGEST_TEXT / 1e6:g} MB"
+TOO_LARGE = f"no case file, which is a text in TOML, named NAME.toml, of at most {LARGEST_TEXT / 1e6:g} MB"
 SECTIONS = (
     ("left", "Model and numbers"),
     ("middle", "Modes over friction"),

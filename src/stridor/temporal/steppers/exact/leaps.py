@@ -94,6 +94,7 @@ class Leaps:
             fastest = motion.fastest()
         self._take(motion, state, zeta, terms, ahead)
         if code == NO_TELLING:
+            motion.reach(end)  # looks again, and says whether the motion has left all numbers
             raise AnalysisError(UNTOLD)
         return code != CHANGE
 

@@ -21,6 +21,7 @@ UNTOLD = (
     "a force, gap or slip of a contact stays so close to zero that no change of status can be told from rounding, "
     'which the exact stepper does not pass; take stepper = "explicit"'
 )
+BEYOND = "the motion is no longer finite: it grows beyond all numbers, and what contacts do then cannot be told"
 HELD = 1e-9  # of a row: what is left of it where contacts leave it no motion
 STORM = 300  # so many events within a `MOMENT`: they accumulate
 # Contacts that throw one another off: behind so many events of a moment, throws shorter than this [rad] end at once.
@@ -144,7 +145,9 @@ class Motion:
             )  # fmt: skip
             self.level, self.unsure = level, self.unsure + unsure
             if code == UNDECIDED:
-                raise AnalysisError(UNTOLD)
+                with np.errstate(over="ignore", invalid="ignore"):  # what is asked is whether it is beyond all numbers
+                    finite = np.all(np.isfinite(anchor.state(anchor.time + after)))
+                raise AnalysisError(UNTOLD if finite else BEYOND)
             if code == CROSSED:
                 self.next = (min(anchor.time + after, last), *anchor.watched.meanings[which])
             elif anchor.time + limit >= last * (1 - 1e-15):

@@ -24,6 +24,7 @@ GROWTH = 16.0  # of the bound, where a part is twice as long
 LET_GO = 2.0**-46  # of the size of its terms, by which rounding is judged
 EPS = 2.0**-52
 SHARES = tuple(1.0 / n for n in range(9, 0, -1))  # of a power series from term to term
+MOST_GROWN = 0.5 * math.log(np.finfo(float).max)  # on a part: what has grown so far can be multiplied with another
 SHORTEST = 1e-7  # rad of the fastest mode on the finest parts: on finer ones rounding holds the modes still
 
 
@@ -64,8 +65,11 @@ def numbers_of(weights: ComplexArray, poles: ComplexArray, rows: Array) -> Numbe
 
 
 def parts_of(poles: ComplexArray, longest: float) -> Parts:
-    """Tables of parts for modes λ (f,)."""
+    """Tables of parts for modes λ (f,), the longest halved until no mode leaves all numbers on it."""
     fastest = float(np.abs(poles).max(initial=0.0))
+    growth = float(poles.real.max(initial=0.0))
+    while longest * growth > MOST_GROWN:
+        longest *= 0.5
     levels = 1 + max(math.ceil(math.log2(longest * fastest / SHORTEST)), 0) if fastest else 24
     lengths = longest * 0.5 ** np.arange(levels)
     moved = poles[None] * lengths[:, None]
@@ -278,7 +282,7 @@ def first_root(
                 off += most(sizes, i, bent, level, amounts)
                 grows = grows and off * GROWTH < least
                 least -= off
-            if least <= 0.0:
+            if not least > 0.0:  # also where it is no number, of which nothing can be told
                 doubtful += 1
         if below == 1 and doubtful == 0 and now[which] + let[which] > 0.0:
             bend = derivative_bound(rows, which, time + length, 3) * length * length / 8
