@@ -129,7 +129,8 @@ def test_what_keeps_a_model_away_is_said_of_the_parameter(tmp_path: Path, case: 
     "varied",
     [
         {"range": (0.0, 0.1)}, {"values": (0.0, 0.1)}, {**NORMAL, "low": 0.0}, {**NORMAL, "deviation": 0.1},
-        {**NORMAL, "distribution": "log-normal"}, {**NORMAL, "distribution": "log-normal", "low": -1.0},
+        {"distribution": "normal", "mean": 0.35, "deviation": 0.05}, {**NORMAL, "distribution": "log-normal"},
+        {**NORMAL, "distribution": "log-normal", "low": -1.0},
     ],
 )  # fmt: skip
 def test_friction_that_is_nowhere_negative_is_taken(case: st.Case, varied: dict) -> None:

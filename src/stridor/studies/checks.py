@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .schema import Study
 
 FRICTION = "mu"
+RARE = 1e-6  # share of a distribution that lies below zero and is let pass
 _NORMAL = ("mean", "deviation")
 
 
@@ -92,7 +93,7 @@ def _of_friction(path: str, varied: Varied) -> Iterator[Problem]:
         # The distribution is cut there; a log-normal one is positive by itself.
         if varied.low < 0 and varied.distribution == "normal":
             yield problem(path, "low", varied.low, accepted)
-    elif float(quantile(varied, np.zeros(1))[0]) < 0:
+    elif float(quantile(varied, np.full(1, RARE))[0]) < 0:
         yield problem(path, "low", None, f"missing – {accepted}, and a normal distribution is cut there by low = 0.0")
 
 
