@@ -302,7 +302,8 @@ class _RegionSearch:
                     search.release()
             return site
         raise AnalysisError(
-            f"P(λ) is singular at λ = {shift:.6g} 1/s and everywhere near it; does some motion lack mass and stiffness?"
+            f"P(λ) is singular at λ = {shift:.6g} 1/s and everywhere near it: some motion lacks "
+            "mass and stiffness, or a value is so large that the others are lost beside it"
         )
 
     def _searched(self, factor: Factor, shift: complex | float, radius: float) -> _Site:
