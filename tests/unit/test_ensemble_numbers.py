@@ -60,14 +60,6 @@ def test_regimes(rate, contact, regime):
         assert found.frequency_hz == pytest.approx(LINE, rel=3e-3)  # an eighth of a bin
 
 
-def test_where_the_strongest_of_a_member_is_too_slow_no_frequency_is_named():
-    time = STEP * np.arange(COUNT)
-    slow = np.sin(2 * np.pi * 90.0 * time)  # 1.8 periods of the window
-    assert np.isnan(observed(slow + 0.3 * np.sin(2 * np.pi * LINE * time), CHANGES).frequency_hz)
-    weak = observed(0.2 * slow + np.sin(2 * np.pi * LINE * time), CHANGES)
-    assert weak.frequency_hz == pytest.approx(LINE, rel=3e-3)
-
-
 def test_amplitudes_are_of_the_window_about_its_mean():
     time = STEP * np.arange(COUNT)
     signal = np.where(time < STEP * COUNT / 2, 50.0, 3.0 * np.sin(2 * np.pi * LINE * time) + 1.0)

@@ -118,51 +118,6 @@ def test_what_is_slower_than_that_is_no_line() -> None:
     assert signals.spectrum(drift + squeal, float(time[1])).line()[0] == pytest.approx(300.0, abs=0.1)
 
 
-TIME = np.linspace(0.0, 1.0, 4096, endpoint=False)
-
-
-def wave(frequency: float, amplitude: float = 1.0, phase: float = 1.0) -> np.ndarray:
-    return amplitude * np.sin(2 * np.pi * frequency * TIME + phase)
-
-
-@pytest.mark.parametrize("periods", [1.2, 1.5, 1.8, 2.1, 2.3])
-def test_where_the_strongest_swings_too_slowly_no_other_line_is_named(periods: float) -> None:
-    for phase in (0.1, 1.7, 4.0):
-        for faster in (5.0, 20.0, 300.0):
-            both = wave(periods, 1.0, phase) + wave(faster, 0.3)
-            assert signals.strongest_line(both + 7.0, float(TIME[1])) == (0.0, 0.0)
-            loud = signals.strongest_line(wave(periods, 0.2, phase) + wave(faster), float(TIME[1]))
-            assert loud[0] == pytest.approx(faster, abs=0.1)
-
-
-@pytest.mark.parametrize(
-    "drift",
-    [
-        np.full(len(TIME), 1e3), 30.0 * TIME, -30.0 * (TIME - 0.3) ** 2, 10.0 * np.exp(-5.0 * TIME), 10.0 * np.exp(-50.0 * TIME),
-        10.0 / (1.0 + np.exp(-40.0 * (TIME - 0.5))),
-    ],
-)  # fmt: skip
-def test_a_drift_hides_no_line(drift: np.ndarray) -> None:
-    for squeal in (20.0, 300.0):
-        found = signals.strongest_line(drift + wave(squeal, 0.1), float(TIME[1]))
-        assert found == pytest.approx((squeal, 0.1), rel=1e-2)
-    assert signals.strongest_line(drift, float(TIME[1]))[1] < 1e-2
-
-
-def test_a_slow_line_on_the_flank_of_a_drift_is_found() -> None:
-    for slope, phase, seen in ((100.0, 0.0, 40.0), (100.0, 5.0, 4.8), (300.0, 5.0, 4.7)):
-        both = slope * TIME + wave(3.4, 1.0, phase) + wave(40.0, 0.1)
-        assert signals.spectrum(both, float(TIME[1])).line()[0] == pytest.approx(seen, abs=0.1)
-        assert signals.strongest_line(both, float(TIME[1]))[0] == pytest.approx(3.4, abs=0.15)
-
-
-def test_a_line_alone_is_that_of_its_spectrum() -> None:
-    for periods in (3.2, 7.5, 300.0):
-        signal = wave(periods)
-        assert signals.strongest_line(signal, float(TIME[1])) == signals.spectrum(signal, float(TIME[1])).line()
-    assert signals.strongest_line(np.zeros(4096), 1.0) == (0.0, 0.0)
-
-
 @pytest.mark.parametrize("grown", [0.3, 0.5, 0.6, 0.8, 0.9, 1.5])
 @pytest.mark.parametrize("dip", [0.0, 0.6])
 def test_growth_is_never_called_saturated_however_slow(grown: float, dip: float) -> None:

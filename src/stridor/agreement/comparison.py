@@ -21,7 +21,7 @@ from ..modal.options import Options
 from ..system import System
 from ..temporal.schedule import PhaseSpec
 from ..temporal.shapes import operating_shape
-from ..temporal.signals import Components, Growth, growth, low_passed, strongest_line
+from ..temporal.signals import Components, Growth, growth, low_passed, spectrum
 from ..temporal.simulate import Settings, simulate
 from ..temporal.trajectory import Trajectory
 from ..threads import one_thread
@@ -397,9 +397,8 @@ def dominant_response(run: Trajectory, max_frequency_hz: float) -> tuple[float |
     """Dominant frequency [Hz] of the last phase and the growth of that line.
 
     Taken from the velocity of the first watched point (what a body radiates follows velocity); without a
-    watched point from the slip speed of the first contact. The spectrum is that of the second half; no frequency is
-    given where something stronger than any line of it swings in fewer than some three periods (`strongest_line`). No
-    growth is given where it could be fitted over less than LEAST_PERIODS of that line.
+    watched point from the slip speed of the first contact. The spectrum is that of the second half. No growth is
+    given where it could be fitted over less than LEAST_PERIODS of that line.
     """
     if not run.phases or not len(run.time):
         return None, None
@@ -421,7 +420,8 @@ def dominant_line(
     """Frequency [Hz] of the largest line in the last share of a signal (k,) sampled every ``sampling`` [s], and the
     growth of that line over all of it, as `dominant_response` has them; None for what there is not."""
     filtered = low_passed(signal, sampling, max_frequency_hz)
-    frequency, amplitude = strongest_line(filtered[int(len(filtered) * (1.0 - share)) :], sampling)
+    spec = spectrum(filtered[int(len(filtered) * (1.0 - share)) :], sampling)
+    frequency, amplitude = spec.line()
     if amplitude == 0.0:
         return None, None
     fitted = growth(filtered, sampling, frequency)

@@ -166,8 +166,7 @@ def of_run(summary: dict[str, Any], *, slides: bool = True) -> Conclusion:
 
     if summary["dominant_frequency_hz"] is None:
         said = (
-            "last phase: too few records, or too few periods of what is strongest (some six are needed), for a "
-            "dominant frequency, or nothing vibrates"
+            "last phase: too few records or periods (some six are needed) for a dominant frequency, or nothing vibrates"
         )
         return Conclusion(said, "modes" if slides else "")
     rate, fit = summary["growth_rate"], summary["growth_fit"]

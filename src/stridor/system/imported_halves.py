@@ -7,7 +7,7 @@ of the friction alone may be.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import scipy.sparse as sp
@@ -49,8 +49,10 @@ def half_doubts(
     for k, (term, found) in enumerate(zip(body.terms, stored, strict=True)):
         if found.lone is None:
             continue
+        names = _names(case, term, where) if couples_apart(found.matrix) else ()
+        apart = MU in names
         if found.role == "mass":
-            if not _completed(stored, matrices):
+            if not apart and not _completed(stored, matrices):
                 accepted = f"is a mass, and {_held(found)}; a mass is symmetric: {_mend(found)}"
                 raise CaseError(f"{where}.terms.{k}.file", found.source, accepted)
         elif not (term.one_sided or found.declared):
@@ -60,7 +62,7 @@ def half_doubts(
                     "it is meant so, say one_sided = true in its term"
                 )
                 raise CaseError(f"{where}.terms.{k}.file", found.source, accepted)
-            if found.role == "damping" or not (couples_apart(found.matrix) and _of_friction(case, term, where)):
+            if found.role == "damping" or not (apart or (names and _few(found))):
                 said.append(
                     f"{found.source}: {_held(found)}; if that is one half of a matrix, {_mend(found)}; if it is meant "
                     "so, say one_sided = true in its term"
@@ -77,12 +79,17 @@ def _is_all(found: StoredMatrix, stored: Sequence[StoredMatrix], matrices: Seque
     """Whether a stiffness of which nothing has a counterpart is the whole one: no other term but those of friction,
     which take forces of some freedoms from others, couples anything back."""
     assert found.lone is not None, "asked for where it has some"
-    if found.matrix.shape[0] < _LEAST_FREEDOMS or sum(found.lone) < _LEAST_ENTRIES:
+    if _few(found):
         return False
     if couples_apart(found.matrix):
         return False
     elastic = [(s, m) for s, m in zip(stored, matrices, strict=True) if s.lone is None or not couples_apart(s.matrix)]
     return lone(_together([s for s, _ in elastic], [m for _, m in elastic], "stiffness")) is not None
+
+
+def _few(found: StoredMatrix) -> bool:
+    """Whether so little of it is one-sided that it may be so by chance."""
+    return found.matrix.shape[0] < _LEAST_FREEDOMS or sum(found.lone or ()) < _LEAST_ENTRIES
 
 
 def _together(stored: Sequence[StoredMatrix], matrices: Sequence[Sparse], role: str) -> Sparse:
@@ -94,11 +101,11 @@ def _together(stored: Sequence[StoredMatrix], matrices: Sequence[Sparse], role: 
     return total
 
 
-def _of_friction(case: Case, term: MatrixTerm, where: str) -> bool:
-    """Whether μ is in the term's factor."""
+def _names(case: Case, term: MatrixTerm, where: str) -> Collection[str]:
+    """Numbers that the term's factor names: friction, or a parameter."""
     if not isinstance(term.factor, str):
-        return False
-    return MU in parse_expression(term.factor, (*case.parameters, MU), where).names
+        return ()
+    return parse_expression(term.factor, (*case.parameters, MU), where).names
 
 
 def _held(found: StoredMatrix) -> str:

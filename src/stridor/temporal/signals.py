@@ -26,7 +26,6 @@ PENCIL_TOLERANCE = 1e-9
 STOP_BAND = 18.0  # β of Kaiser's window
 STOP_DECIBELS = 170.0
 Numbers = TypeVar("Numbers", Array, ComplexArray)
-SMOOTHED = 12  # of the length of a signal: over one of so many parts what is slow in it is averaged
 LONGEST, WIDEST = 3000, 400  # samples and subspace rows of the matrix pencil
 SHARE = 1e-3  # components below this share of the strongest are not trusted
 
@@ -60,57 +59,11 @@ class Spectrum:
         a = self.amplitude
         higher = np.zeros(len(a), dtype=bool)
         higher[1:-1] = (a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:])
-        higher[: self.unresolved] = False
+        higher[: math.ceil(self.bandwidth_hz / self.resolution_hz) + 1] = False
         if not higher.any():
             return 0.0, 0.0
         k = int(np.argmax(np.where(higher, a, -1.0)))
         return _interpolated(self.frequency_hz, a, k), float(a[k])
-
-    @property
-    def unresolved(self) -> int:
-        """How many bins there are at the low end in which no line is told from the mean: the width of one."""
-        return math.ceil(self.bandwidth_hz / self.resolution_hz) + 1
-
-
-def strongest_line(signal: Array, sampling: float) -> tuple[float, float]:
-    """Frequency [Hz] and amplitude of the strongest line of a signal (k,) sampled every ``sampling`` [s], (0, 0) where
-    there is none or where something stronger swings too slowly for the length of the signal to be told, in fewer than
-    some three periods: what is second is not the strongest.
-
-    A mean and a drift that goes one way, or turns once as a parabola does, are no lines and hide none, however large.
-    """
-    found, flat = spectrum(signal, sampling), spectrum(_flattened(signal), sampling)
-    line, other = found.line(), flat.line()
-    # The flank of a drift may hide a line that is slow, and that is stronger than the one seen beside it, or shift it.
-    if other[1] > 0.0 and abs(other[0] - line[0]) > 0.5 * found.resolution_hz:
-        line = other
-    slow = float(flat.amplitude[: flat.unresolved].max(initial=0.0))
-    if line[1] > 0.0 and slow > line[1] and _turns_back(signal, 2.0 * line[1]):
-        return 0.0, 0.0
-    return line
-
-
-def _flattened(signal: Array) -> Array:
-    """A signal (k,) less its mean, slope and curvature."""
-    time = np.linspace(-1.0, 1.0, len(signal))
-    basis = np.stack([np.ones(len(signal)), time, time**2 - np.mean(time**2)])
-    return signal - (basis @ signal / np.sum(basis**2, axis=1)) @ basis
-
-
-def _turns_back(signal: Array, least: float) -> bool:
-    """Whether what is slow in a signal (k,) goes one way and back, by more than ``least`` each. It is a mean with
-    weights above zero: of what goes one way that goes one way, too."""
-    weights = hann(max(4, len(signal) // SMOOTHED))
-    slow = _convolved(signal - np.mean(signal), weights / weights.sum())
-    low, high = np.minimum.accumulate(slow), np.maximum.accumulate(slow)
-    fallen, risen = high - slow > least, slow - low > least
-    # The first way is the one in which it has moved so far first; the other must come after an extreme.
-    if not (fallen.any() and risen.any()):
-        return False
-    down = int(np.argmax(fallen)) < int(np.argmax(risen))
-    way = slow if down else -slow
-    turned = way[int(np.argmax(fallen if down else risen)) :]
-    return bool(np.any(turned - np.minimum.accumulate(turned) > least))
 
 
 def _interpolated(frequency: Array, amplitude: Array, k: int) -> float:
