@@ -12,7 +12,8 @@ from solid_cases import slider
 from stridor.case import loads
 from stridor.errors import AnalysisError
 from stridor.sliding import equilibrium, prepared
-from stridor.sliding.solution import SteadySliding, steady_sliding
+from stridor.sliding.result import SteadySliding
+from stridor.sliding.solution import steady_sliding
 from stridor.system import System, build_system
 from stridor.typing import BoolArray
 

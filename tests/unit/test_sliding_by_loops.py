@@ -21,8 +21,8 @@ from stridor.laws import Coulomb, Weakening
 from stridor.sliding import equilibrium, motions, pressing, solution, stretches
 from stridor.sliding.equilibrium import NodeEquilibrium, find_touching, offenders
 from stridor.sliding.redundant import redundant
+from stridor.sliding.result import SteadySliding
 from stridor.sliding.resultants import balance, resultants
-from stridor.sliding.solution import SteadySliding
 from stridor.sliding.stick_slip import Frictional, Loading, StickSlip
 from stridor.sliding.stretches import Stretch, _different, _Equilibria, _Look, _probes
 from stridor.system.model import AnswerCache

@@ -22,7 +22,7 @@ from stridor.contact.multipliers import OPEN, SLIP, STICK
 from stridor.errors import AnalysisError, CaseError
 from stridor.laws import Coulomb
 from stridor.sliding import steady_sliding
-from stridor.sliding.solution import SteadySliding
+from stridor.sliding.result import SteadySliding
 from stridor.system import System
 from stridor.system.load_steps import LoadStep
 from stridor.temporal.settings import Settings

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-import scipy.sparse.linalg as ssl
 
 from ..contact.nodes import ContactNodes
+from ..direct import factorise
 from ..modal.derivatives import hold, pencil_of
 from ..modal.options import Options
 from ..system import System
-from ..typing import ComplexArray
+from ..typing import Array, ComplexArray
 
 TOGETHER = 1e-4  # of |λ|: modes that no signal in time tells apart
 NEARLY = 1e-2  # of a vector, the root of that: how far vectors are apart beside a root that is double
@@ -39,7 +39,7 @@ def silent_pairs(nodes: ContactNodes, lam: ComplexArray, vectors: ComplexArray) 
     return found
 
 
-def slip_of(nodes: ContactNodes, vector: ComplexArray) -> np.ndarray:
+def slip_of(nodes: ContactNodes, vector: ComplexArray) -> Array:
     """How far each contact node (m,) slips at most in a motion (n,)."""
     return np.linalg.norm(np.abs(nodes.tangent @ vector).reshape(nodes.count, -1), axis=1)
 
@@ -54,11 +54,10 @@ def second_of(system: System, mu: float, lam: complex, vector: ComplexArray, opt
     v = np.zeros(size, dtype=complex)
     v[:motions] = vector
     column = np.random.default_rng(0).standard_normal(size) * float(np.abs(stiffness.data).max(initial=0.0))
-    whole = sp.csc_array(
-        sp.block_array(
-            [[lam**2 * mass + lam * damping + stiffness, column[:, None]], [v.conj()[None, :], np.zeros((1, 1))]],
-            format="csc",
-        )
+    whole = sp.block_array(
+        [[lam**2 * mass + lam * damping + stiffness, column[:, None]], [v.conj()[None, :], np.zeros((1, 1))]],
+        format="csr",
     )
     right = np.append(-(2 * lam * (mass @ v) + damping @ v), 0.0)
-    return np.asarray(ssl.spsolve(whole, right))[:motions]
+    with factorise(sp.csr_array(whole), saddle=True, solver=options.solver) as factor:
+        return np.asarray(factor.solve(right))[:motions]

@@ -14,7 +14,7 @@ from ..io.atomic import replacing, write_text
 from ..io.vtk import write_vtk
 from ..modal.complex_modes import ComplexModes
 from ..modal.options import Options
-from ..sliding.solution import SteadySliding
+from ..sliding.result import SteadySliding
 from ..stages import passing, stage
 from ..study import analyses
 from ..study.workspace import Problem, Workspace

@@ -57,18 +57,20 @@ class PointCoupling:
 
     def friction_damping(self, mu: float) -> Array:
         """d = N dμ/d|v| (m,) [N s/m] at steady sliding with coefficient ``mu``."""
-        return self.friction_damping_slope(mu)[0]
+        return self.friction_damping_slope(mu)[0] if self.sloped and mu else np.zeros(self.contacts)
 
     def friction_damping_slope(self, mu: float) -> tuple[Array, Array]:
         """d and its derivative in μ (m,)."""
-        if not self.sloped or mu == 0.0:
+        if not self.sloped:
             zero = np.zeros(self.contacts)
-            return zero, self._slopes(1.0) * self._forces(0.0)[0] if self.sloped else zero
+            return zero, zero
         # Newton's method asks at one μ once for every root.
         return self.system.once(("friction damping", mu), lambda: self._friction_damping(mu))
 
     def _friction_damping(self, mu: float) -> tuple[Array, Array]:
         (force, rate), step = self._forces(mu), 1e-4 * mu
+        if mu == 0.0:  # there is no damping yet, and it sets in with the slope that a unit of friction has
+            return _kept(np.zeros(self.contacts)), _kept(self._slopes(1.0) * force)
         slopes = self._slopes(mu)
         # As good as exact: laws are scaled to μ, and slopes with them.
         turning = (self._slopes(mu + step) - self._slopes(mu - step)) / (2.0 * step)

@@ -28,7 +28,8 @@ from ..modal.painleve import steps_undetermined
 from ..modal.receptance_modes import prepare
 from ..modal.source import by_receptance, require_full
 from ..sliding import taken_as_closed
-from ..sliding.solution import SteadySliding, other_equilibria
+from ..sliding.result import SteadySliding
+from ..sliding.solution import other_equilibria
 from ..sliding.stretches import instead_of_own
 from ..system import System
 from ..temporal.settings import Settings

@@ -20,7 +20,7 @@ from ..mesh.model import Mesh
 from ..mesh.quality import edge_lengths, pieces
 from ..notebook import Shown, counted, html_table
 from ..sliding import anything_acts, steady_nodes
-from ..sliding.solution import SteadySliding
+from ..sliding.result import SteadySliding
 from ..system import System
 from ..temporal.inputs import unfit_in_time
 from ..temporal.schedule import lay_out

@@ -17,7 +17,7 @@ from ..errors import AnalysisError
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onsets
 from ..sliding import anything_acts
-from ..sliding.solution import SteadySliding
+from ..sliding.result import SteadySliding
 from ..system import System
 from ..temporal.shapes import operating_shape
 from ..temporal.simulate import Progress

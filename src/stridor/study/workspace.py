@@ -25,7 +25,8 @@ from ..laws.friction import Shared, own_law
 from ..modal.options import Options
 from ..notebook import Shown, counted
 from ..sliding import full_motion
-from ..sliding.solution import SteadySliding, steady_nodes
+from ..sliding.result import SteadySliding
+from ..sliding.solution import steady_nodes
 from ..system import System, build_system
 from ..system.model import AnswerCache
 from ..temporal.inputs import unfit_in_time

@@ -10,7 +10,7 @@ from ..case import Case
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onsets
 from ..periodic import Cycles
-from ..sliding.solution import SteadySliding
+from ..sliding.result import SteadySliding
 from ..study.measures import Countermeasures
 from ..study.saturation import Unsaturated
 from ..study.sensitivities import Sensitivities
