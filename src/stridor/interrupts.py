@@ -111,9 +111,10 @@ def gone() -> None:
 def held() -> Generator[HeldSignals]:
     """A block that a first Ctrl-C does not interrupt: it looks at ``asked`` itself and says ``met`` when it ends early.
 
-    What was asked for and not met reaches the block around this one, or is raised as KeyboardInterrupt at its end.
+    What was asked for in the block around this one, and not met there, is asked of this one. What was asked for and not
+    met reaches the block around this one, or is raised as KeyboardInterrupt at its end.
     """
-    block = HeldSignals()
+    block = HeldSignals(asked=_asked_around())
     before = _take_over()
     _program.blocks.append(block)
     try:
@@ -145,13 +146,24 @@ def in_one_piece() -> Generator[None]:
 
 @contextlib.contextmanager
 def at_once() -> Generator[None]:
-    """A part of a `held` block that may be interrupted at any place: nothing is lost by it, and it takes long."""
+    """A part of a `held` block that may be interrupted at any place, also by what was asked for before it: nothing is
+    lost by it, and it takes long."""
+    if _asked_around():
+        interrupt()
     block = HeldSignals(met=True)
     _program.blocks.append(block)
     try:
         yield
     finally:
         _program.blocks.remove(block)
+
+
+def _asked_around() -> bool:
+    """Whether an end was asked for in the block that is under way, and is not met. It is the main thread that ends."""
+    if not _program.blocks or threading.current_thread() is not threading.main_thread():
+        return False
+    around = _program.blocks[-1]
+    return around.asked and not around.met
 
 
 def _take_over() -> Any:

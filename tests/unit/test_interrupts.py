@@ -38,3 +38,59 @@ def test_other_things_that_nobody_can_catch_are_told() -> None:
     told = DROPPED.replace("(interrupts.interrupt)", "(lambda: 1 / 0)").replace("time.sleep(20)", "raise KeyboardInterrupt")
     done = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=False, timeout=60)
     assert "ZeroDivisionError" in done.stderr
+
+
+EARLY = """
+import os, signal
+from stridor import interrupts
+
+interrupts.install()
+try:
+    with interrupts.held():
+        os.kill(os.getpid(), signal.SIGINT)  # asked for before the block that looks at it has begun
+        with interrupts.{inner}() as block:
+            print("asked" if block.asked else "not asked", flush=True)
+            block.met = True
+        print("on it goes", flush=True)
+except KeyboardInterrupt:
+    interrupts.heard()
+    print("interrupted", flush=True)
+"""
+
+
+@pytest.mark.parametrize(
+    ("inner", "told"), [("held", ["asked", "on it goes", "interrupted"]), ("at_once", ["interrupted"])]
+)
+def test_what_was_asked_for_before_a_block_reaches_it(inner: str, told: list[str]) -> None:
+    words = [sys.executable, "-c", EARLY.format(inner=inner)]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=60)
+    assert done.stdout.splitlines() == told, done.stderr
+
+
+def test_a_run_asked_to_end_while_it_is_prepared_does_not_begin() -> None:
+    """Ctrl-C between the start of the program and the first step once waited for the last one."""
+    done = subprocess.run([sys.executable, "-c", PREPARED], capture_output=True, text=True, check=False, timeout=120)
+    assert done.stdout.splitlines() == ["interrupted"], done.stderr
+
+
+PREPARED = """
+import os, signal
+import stridor as st
+from stridor import interrupts
+from stridor.case import Case, loads, template_text
+from stridor.temporal import simulate
+
+interrupts.install()
+def prepared(*_, **__):
+    os.kill(os.getpid(), signal.SIGINT)
+    raise RuntimeError("not interrupted where it is prepared")
+
+simulate.settings_of_restart = prepared
+try:
+    with interrupts.held():
+        st.simulate(st.loads(template_text("two-beams")))
+        print("a run")
+except KeyboardInterrupt:
+    interrupts.heard()
+    print("interrupted")
+"""

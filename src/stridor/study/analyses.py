@@ -19,6 +19,7 @@ from ..asking import FUNCTION, NUMBER, NUMBERS, SWITCH, SWITCH_OR_NONE, takes
 from ..case.matrix_checks import MU
 from ..errors import AnalysisError, CaseError
 from ..errors import Problem as Wrong
+from ..interrupts import at_once
 from ..modal.complex_modes import ComplexModes
 from ..modal.full import ParametricOnsets, full_modes, full_onsets
 from ..modal.onsets import Onsets
@@ -320,25 +321,26 @@ def simulate(
     phases of its workspace, and without one for 0.01 s under all its loads.
     """
     started = time.perf_counter()
-    require_friction(mu, several=False)
-    work = Workspace.of(problem)
-    marks: dict[str, Any] = {"restarts": []}
-    if restart is not None:
-        given: Any = restart
-        if not isinstance(given, Trajectory):
-            raise CaseError("restart", given, "a run, of st.simulate or st.open(path)")
-        now = check_restart(work.case("restart"), mu, restart, changed=changed)
-        marks["restarts"] = [*restart.provenance.get("restarts", []), now]
-    elif changed:
-        raise CaseError("changed", True, "goes with restart")
-    if work.given is not None:
-        marks["fingerprint"] = fingerprint(work.given, mu)
-    system, phases, settings = work.structured("simulate", mu), phases_of(work), settings_of(work)
-    require_pressed_in_time(work, system, "simulate")
-    beyond = steps_undetermined(settings.system(system), mu, work.options)
-    if notes := [*(() if mu is None else work.one_for_all), *system.tie_words, *([beyond] if beyond else [])]:
-        marks["notes"] = notes
-    check_extent(work, system)
+    with at_once():  # nothing is computed yet
+        require_friction(mu, several=False)
+        work = Workspace.of(problem)
+        marks: dict[str, Any] = {"restarts": []}
+        if restart is not None:
+            given: Any = restart
+            if not isinstance(given, Trajectory):
+                raise CaseError("restart", given, "a run, of st.simulate or st.open(path)")
+            now = check_restart(work.case("restart"), mu, restart, changed=changed)
+            marks["restarts"] = [*restart.provenance.get("restarts", []), now]
+        elif changed:
+            raise CaseError("changed", True, "goes with restart")
+        if work.given is not None:
+            marks["fingerprint"] = fingerprint(work.given, mu)
+        system, phases, settings = work.structured("simulate", mu), phases_of(work), settings_of(work)
+        require_pressed_in_time(work, system, "simulate")
+        beyond = steps_undetermined(settings.system(system), mu, work.options)
+        if notes := [*(() if mu is None else work.one_for_all), *system.tie_words, *([beyond] if beyond else [])]:
+            marks["notes"] = notes
+        check_extent(work, system)
 
     def told(run: Trajectory) -> Trajectory:
         made = provenance(work, "simulate", time.perf_counter() - started, mu=mu)

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import CaseError
+from ..interrupts import at_once
 from ..stages import passing, stage
 from ..system import System
 from ..threads import one_thread
@@ -65,31 +66,32 @@ def simulate(
     master; what was computed is then in the error's ``trajectory``.
     """
     stage("time loop; the first one of a version is compiled for up to a minute")
-    settings = settings_of_restart(settings or Settings(), restart)
-    system = settings.system(system)
-    check_inputs(
-        system,
-        phases,
-        step=settings.step,
-        beta2=settings.beta2,
-        record_every=settings.record_every,
-        watch=settings.watch,
-    )
-    settings, why = _chosen(system, settings, phases, restart)
-    if settings.stepper == "implicit":
-        settings = replace(settings, step=whole_steps(settings, phases))
-    with _saying(settings, why):
-        stepper = stepper_for(system, settings, mu, why)
-    motion = system.motion
-    schedule = lay_out(phases, stepper.scheme.step, list(system.loads), list(motion.names), motion.full_distance)
-    schedule.require_whole(phases, even=settings.stepper in ("exact", "implicit"))
-    if settings.initial == "steady-sliding":
-        schedule = schedule.from_steady()
-    march = March(stepper, schedule, settings, join=join, observe=observe)
-    if restart is None:
-        stepper.begin(schedule, settings, mu, disturbance)
-    else:
-        march.resume(restart, changed=changed)
+    with at_once():  # nothing is computed yet
+        settings = settings_of_restart(settings or Settings(), restart)
+        system = settings.system(system)
+        check_inputs(
+            system,
+            phases,
+            step=settings.step,
+            beta2=settings.beta2,
+            record_every=settings.record_every,
+            watch=settings.watch,
+        )
+        settings, why = _chosen(system, settings, phases, restart)
+        if settings.stepper == "implicit":
+            settings = replace(settings, step=whole_steps(settings, phases))
+        with _saying(settings, why):
+            stepper = stepper_for(system, settings, mu, why)
+        motion = system.motion
+        schedule = lay_out(phases, stepper.scheme.step, list(system.loads), list(motion.names), motion.full_distance)
+        schedule.require_whole(phases, even=settings.stepper in ("exact", "implicit"))
+        if settings.initial == "steady-sliding":
+            schedule = schedule.from_steady()
+        march = March(stepper, schedule, settings, join=join, observe=observe)
+        if restart is None:
+            stepper.begin(schedule, settings, mu, disturbance)
+        else:
+            march.resume(restart, changed=changed)
     return march.run(progress, checkpoint, checkpoint_seconds)
 
 
