@@ -171,6 +171,32 @@ def test_a_run_without_records_in_its_last_phase_is_summed_up(run_file: Path) ->
         assert st.summarise(case, cut).dominant_frequency_hz is None
 
 
+@pytest.mark.parametrize(("slow", "told"), [(3.0, True), (0.1, False)])
+def test_what_is_stronger_than_the_dominant_line_and_slower_than_the_window_resolves_is_told(
+    run_file: Path, slow: float, told: bool
+) -> None:
+    """A swing of one period in the phase, beside a line of many: the line is named, and what is stronger is said."""
+    from dataclasses import replace
+
+    from stridor.app.conclusions import of_run
+
+    run = st.open(run_file)
+    time = run.time - run.time[0]
+    length = time[-1]
+    line, swing = (np.sin(2 * np.pi * periods * time / length) for periods in (40.0, 1.0))
+    velocity = np.broadcast_to((line + slow * swing)[:, None, None], run.velocity.shape)
+    phase = replace(run.phases[-1], start=run.time[0], end=run.time[-1])
+    case = st.loads(template_text("two-beams"), COARSE)
+    summary = st.summarise(case, replace(run, velocity=velocity, phases=(phase,)))
+    assert summary.dominant_frequency_hz == pytest.approx(40.0 / length, rel=0.02)
+    assert (summary.stronger_below_hz is not None) is told
+    if summary.stronger_below_hz is not None:  # the third bin of Hann's window over half of what the filter leaves
+        assert 6 / length <= summary.stronger_below_hz <= 9.01 / length
+    sentence = of_run(summary.to_json()).sentence
+    assert ("is stronger, and the second half of the phase is too short" in sentence) is told
+    assert ("Hz dominates" in sentence) is not told
+
+
 def test_dollars_in_names_begin_no_formula(tmp_path: Path) -> None:
     """What is written is shown, on figures as in tables."""
 

@@ -1,6 +1,6 @@
 """Modal against temporal: do both approaches tell the same story?"""
 
-from .comparison import PARTS, compare, dominant_response
+from .comparison import PARTS, compare, dominant_response, stronger_below
 from .critical import critical_friction
 from .four_answers import GOOD_AMPLITUDE, CycleSeen, FourAnswers
 from .kept import PartStore
@@ -36,4 +36,5 @@ __all__ = [
     "mode_shape",
     "perturb",
     "settled",
+    "stronger_below",
 ]

@@ -21,7 +21,7 @@ from ..modal.options import Options
 from ..system import System
 from ..temporal.schedule import PhaseSpec
 from ..temporal.shapes import operating_shape
-from ..temporal.signals import Components, Growth, growth, low_passed, spectrum
+from ..temporal.signals import Components, Growth, Spectrum, growth, low_passed, spectrum
 from ..temporal.simulate import Settings, simulate
 from ..temporal.trajectory import Trajectory
 from ..threads import one_thread
@@ -400,18 +400,35 @@ def dominant_response(run: Trajectory, max_frequency_hz: float) -> tuple[float |
     watched point from the slip speed of the first contact. The spectrum is that of the second half. No growth is
     given where it could be fitted over less than LEAST_PERIODS of that line.
     """
+    signal = _response(run)
+    return (None, None) if signal is None else dominant_line(signal, run.sampling, max_frequency_hz)
+
+
+def _response(run: Trajectory) -> Array | None:
+    """The signal (k,) of the last phase in which `dominant_response` looks; None where there is too little of it."""
     if not run.phases or not len(run.time):
-        return None, None
+        return None
     part = run.phase_slice()
     if len(run.time[part]) < 64:
-        return None, None
+        return None
     if run.watch_names:
-        signal = run.velocity[part, 0, int(np.argmax(np.ptp(run.velocity[part, 0], axis=0)))]
-    elif run.contact_names:
-        signal = run.slip_speed[part, 0]
-    else:
-        return None, None
-    return dominant_line(signal, run.sampling, max_frequency_hz)
+        return run.velocity[part, 0, int(np.argmax(np.ptp(run.velocity[part, 0], axis=0)))]
+    return run.slip_speed[part, 0] if run.contact_names else None
+
+
+def stronger_below(run: Trajectory, max_frequency_hz: float) -> float | None:
+    """Frequency [Hz] below which something swings or drifts that is stronger than the dominant line and that the second
+    half of the last phase is too short to resolve; None where there is no such thing, or no dominant line."""
+    signal = _response(run)
+    if signal is None:
+        return None
+    spec = _spectrum_of_end(low_passed(signal, run.sampling, max_frequency_hz), run.sampling, 0.5)
+    (below, slow), (_, amplitude) = spec.slower(), spec.line()
+    return below if 0.0 < amplitude < slow else None
+
+
+def _spectrum_of_end(filtered: Array, sampling: float, share: float) -> Spectrum:
+    return spectrum(filtered[int(len(filtered) * (1.0 - share)) :], sampling)
 
 
 def dominant_line(
@@ -420,8 +437,7 @@ def dominant_line(
     """Frequency [Hz] of the largest line in the last share of a signal (k,) sampled every ``sampling`` [s], and the
     growth of that line over all of it, as `dominant_response` has them; None for what there is not."""
     filtered = low_passed(signal, sampling, max_frequency_hz)
-    spec = spectrum(filtered[int(len(filtered) * (1.0 - share)) :], sampling)
-    frequency, amplitude = spec.line()
+    frequency, amplitude = _spectrum_of_end(filtered, sampling, share).line()
     if amplitude == 0.0:
         return None, None
     fitted = growth(filtered, sampling, frequency)

@@ -175,7 +175,13 @@ def of_run(summary: dict[str, Any], *, slides: bool = True) -> Conclusion:
         state = state_of(rate, fit["end"] - fit["start"], saturated=bool(summary["saturated"]))
         growth = f"growth {measured(rate, 1)} 1/s where exponential"
     growth = "" if state == "of constant amplitude" else f"{growth}, "
-    said = f"last phase: {measured(summary['dominant_frequency_hz'], 1)} Hz dominates, {growth}{state}"
+    loudest, below = measured(summary["dominant_frequency_hz"], 1), summary["stronger_below_hz"]
+    said = f"last phase: {loudest} Hz {'dominates' if below is None else 'is the strongest line'}, {growth}{state}"
+    if below is not None:
+        said += (
+            f"; what swings or drifts below {measured(below, 1)} Hz is stronger, and the second half of the phase is "
+            "too short to tell its frequency: give the phase a longer duration to see it"
+        )
     return Conclusion(said, "compare" if slides else "")
 
 

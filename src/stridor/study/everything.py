@@ -203,7 +203,7 @@ def compute_everything(
     summary = None if run is None else analyses.summarise(work, run)
     still = None if run is None else unsaturated(work, run, modal.own)
     if still is not None and summary is not None:
-        summary = replace(summary, dominant_frequency_hz=None)
+        summary = replace(summary, dominant_frequency_hz=None, stronger_below_hz=None)
     shape, mode, operating, agreement = _shape(system, modal), _eigenvalue(modal), None, None
     if mu is None and (run is None or not run.interrupted):
         agreement = _or_note(lambda: temporal.compare(run, growing=still is not None), notes, "no comparison")

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..agreement import dominant_response, linear_part
+from ..agreement import dominant_response, linear_part, stronger_below
 from ..asking import takes
 from ..digits import hertz
 from ..notebook import Shown
@@ -26,13 +26,18 @@ LEAST_RECORDS = 128  # from which on components are sought in a run
 
 @dataclass(frozen=True, repr=False)
 class RunSummary(Shown):
-    """What `stridor simulate` prints: the last phase in numbers, the energies, the cost."""
+    """What `stridor simulate` prints: the last phase in numbers, the energies, the cost.
+
+    stronger_below_hz: frequency [Hz] below which something is stronger than the dominant line that the second half of
+    the last phase is too short to resolve; None where nothing is.
+    """
 
     dominant_frequency_hz: float | None
     growth: Growth | None
     energy: EnergyBalance
     trajectory: Trajectory
     linear: complex | None = None
+    stronger_below_hz: float | None = None
 
     @property
     def _line(self) -> str:
@@ -60,6 +65,7 @@ class RunSummary(Shown):
         last = run.phases[-1] if run.phases else None
         return {
             "dominant_frequency_hz": self.dominant_frequency_hz,
+            "stronger_below_hz": self.stronger_below_hz,
             "growth_rate": self.growth_rate,
             "growth_fit": None
             if self.growth is None
@@ -140,7 +146,8 @@ def summarise(problem: Problem, run: Trajectory) -> RunSummary:
         steady = slip_speeds(system, full_motion(system))
         found = linear_part(run.slip_speed - steady, steady, skip=16)
         linear = components(found, run.sampling, max_frequency_hz=limit).fastest or None
-    return RunSummary(dominant, fitted, energy_balance(run), run, linear)
+    below = None if dominant is None else stronger_below(run, limit)
+    return RunSummary(dominant, fitted, energy_balance(run), run, linear, below)
 
 
 def _of_points(work: Workspace, run: Trajectory) -> bool:

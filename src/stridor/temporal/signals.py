@@ -59,11 +59,21 @@ class Spectrum:
         a = self.amplitude
         higher = np.zeros(len(a), dtype=bool)
         higher[1:-1] = (a[1:-1] > a[:-2]) & (a[1:-1] >= a[2:])
-        higher[: math.ceil(self.bandwidth_hz / self.resolution_hz) + 1] = False
+        higher[: self._first] = False
         if not higher.any():
             return 0.0, 0.0
         k = int(np.argmax(np.where(higher, a, -1.0)))
         return _interpolated(self.frequency_hz, a, k), float(a[k])
+
+    @property
+    def _first(self) -> int:
+        """The first bin whose line stands apart from the mean."""
+        return math.ceil(self.bandwidth_hz / self.resolution_hz) + 1
+
+    def slower(self) -> tuple[float, float]:
+        """Frequency [Hz] below which no line is told from the mean, and the largest amplitude there (0 without any)."""
+        first = min(self._first, len(self.frequency_hz) - 1)
+        return float(self.frequency_hz[first]), float(self.amplitude[1:first].max(initial=0.0))
 
 
 def _interpolated(frequency: Array, amplitude: Array, k: int) -> float:
