@@ -91,7 +91,7 @@ def check() -> None:
 
 def leave() -> None:
     """From here on a signal ends the process at once, without a word: everything is written."""
-    _program.leaving = True
+    _program.leaving, _program.pending = True, False
     _stop_insisting()
 
 
