@@ -44,6 +44,7 @@ EARLY = """
 import os, signal
 from stridor import interrupts
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job has it ignored
 interrupts.install()
 try:
     with interrupts.held():
@@ -80,6 +81,7 @@ from stridor import interrupts
 from stridor.case import Case, loads, template_text
 from stridor.temporal import simulate
 
+signal.signal(signal.SIGINT, signal.default_int_handler)
 interrupts.install()
 def prepared(*_, **__):
     os.kill(os.getpid(), signal.SIGINT)
