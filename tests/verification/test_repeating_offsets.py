@@ -111,6 +111,17 @@ def test_any_offset_in_space_is_that_in_the_first_sector() -> None:
         assert what_comes_out(in_space(10.0 + 60.0 * sectors)) == pytest.approx(expected, rel=1e-8, abs=1e-14)
 
 
+@pytest.mark.parametrize("seed", [17, *(pytest.param(k, marks=pytest.mark.slow) for k in (0, 1, 5, 22))])
+def test_rounding_has_no_say_in_pressures_of_curved_facets(seed: int) -> None:
+    """Edges of both meshes coincide: how facets are cut into pieces must not hang on the last digit of a turn."""
+    sectors = random_ring(seed, dimension=3, rigid=True).sectors
+    pressure = []
+    for turns in (0, 1):
+        case = loads(random_ring(seed, dimension=3, rigid=True, offset=360.0 * turns / sectors).sector)
+        pressure.append(np.sort(st.steady_sliding(case).normal_force / st.build_system(case).contact_nodes().area))
+    assert pressure[1] == pytest.approx(pressure[0], rel=1e-9)
+
+
 def test_gaps_near_the_end_of_the_images_are_those_of_the_whole() -> None:
     """A slave from −57° on, two facets to the sector: one image ended at −60° with a spline of its own there."""
     case, whole = (
