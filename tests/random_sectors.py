@@ -29,9 +29,10 @@ poisson_ratio = 0.25
 """
 
 
-def random_ring(seed: int, *, dimension: int, rigid: bool) -> Ring:
+def random_ring(seed: int, *, dimension: int, rigid: bool, offset: float | None = None) -> Ring:
     """Two rings one in the other (in the plane) or one on the other (in space), of cells and divisions of their own, or
-    one on a wall; the outer or upper one turns. Sectors begin at any angle, in the plane not always both at the same."""
+    one on a wall; the outer or upper one turns. Sectors begin at any angle, in the plane not always both at the same, or
+    the second an offset [degrees] after the first."""
     rng = np.random.default_rng(seed)
     sectors, mu = int(rng.integers(2 if dimension == 2 else 3, 7)), round(float(rng.uniform(0.1, 0.6)), 3)
     kinds = ["quad", "quad8", "triangle", "triangle6", "quad9"]
@@ -47,6 +48,8 @@ def random_ring(seed: int, *, dimension: int, rigid: bool) -> Ring:
     alike = bool(rng.random() < 0.3)  # meshes match over the contact
     if alike:
         cells[1], around[1], starts[1] = cells[0], around[0], starts[0]
+    if offset is not None:
+        starts[1] = first + offset
     texts = []
     for whole in (False, True):
         text = HEAD

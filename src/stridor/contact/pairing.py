@@ -74,7 +74,10 @@ def pair_surface(
         if over is None:
             facets, facing, location = _opposed(facets, slave_position, facing, location)
         else:
+            edge = facing[0]
             facets, (facing, location) = over.blocks, over.places(facing)
+            if not len(facing):
+                raise CaseError(where, None, _only_at_an_edge(slave_position[edge]))
         around = SlaveFacets.of(
             slave_position, facets, facing, thickness=thickness, nodal_gaps=adjust, hanging=over
         )  # fmt: skip
@@ -285,6 +288,13 @@ def _never_touching(position: Array, location: Location, opposed: BoolArray, rea
     if location.inside.any():
         return f"{lead}, and their outward normals do not oppose each other; check which boundaries are meant"
     return f"{lead}, and none lies over the master; all are beyond its edges. Move a body or take a longer boundary"
+
+
+def _only_at_an_edge(position: Array) -> str:
+    return (
+        f"the bodies do not face each other: they only meet at an edge of the master, at {_coordinates(position)}, and "
+        "no facet of the slave lies over the master. Move a body or take a longer boundary"
+    )
 
 
 def _overlapping(position: Array, location: Location, deepest: int, tolerance: float) -> str:

@@ -13,7 +13,7 @@ from ..contact.interface import Contact
 from ..contact.surfaces import SurfaceContact
 from ..errors import CaseError
 from ..typing import Array, IntArray
-from .repeats import master_nodes
+from .repeats import master_nodes, slave_positions
 from .supports import boundary_nodes
 from .view import View, nearest_node
 
@@ -80,7 +80,9 @@ def _touched(case: Case, view: View, contact: Contact | SurfaceContact) -> IntAr
     elif body.beam is not None:
         return slave  # a line under a whole boundary: its ends say little of what presses where
     else:
-        nodes = master_nodes(case, body, boundary, f"contacts.{contact.name}.master")[1]
+        where = f"contacts.{contact.name}"
+        above = slave_positions(case, view.bodies, table.slave, f"{where}.slave")
+        nodes = master_nodes(case, body, boundary, f"{where}.master", above)[1]
         nodes = nodes[np.unique(contact.location.nodes[contact.location.weights != 0.0])]
     return np.concatenate([slave, body.displacements(nodes).ravel()])
 

@@ -63,7 +63,7 @@ def surface_contact(case: Case, view: View, name: str, contact: ContactCase) -> 
     """Slave nodes of a boundary, or one point, on a boundary or an obstacle."""
     where = f"contacts.{name}"
     slave_rows, position, area, normals, facets, freedoms = _slave(case, view, where, contact)
-    master, master_rows = _master(case, view, where, contact)
+    master, master_rows = _master(case, view, where, contact, position)
     slave_body = case.location(contact.slave).body
     drift = _drift(case, view, slave_body, contact.master.partition(".")[0], position)
     built = pair_surface(
@@ -126,7 +126,10 @@ def _thickness(case: Case, body: str, dimension: int) -> float:
     return float(getattr(case.bodies[body], "thickness", 1.0)) if dimension == 2 else 1.0
 
 
-def _master(case: Case, view: View, where: str, contact: ContactCase) -> tuple[MasterSurface, Rows]:
+def _master(
+    case: Case, view: View, where: str, contact: ContactCase, slave: Array
+) -> tuple[MasterSurface, Rows]:
+    """The surface that slave positions (m, d) [m] are to lie on, and the rows of its nodes' displacements."""
     owner, _, boundary = contact.master.partition(".")
     table = case.bodies[owner]
     if isinstance(table, ObstacleBody):
@@ -141,7 +144,7 @@ def _master(case: Case, view: View, where: str, contact: ContactCase) -> tuple[M
         lines = np.stack([np.arange(len(order) - 1), np.arange(1, len(order))], axis=1)
         line = Curve.from_facets(body.points[order], {"line": lines}, where=f"{where}.master", follows_spline=True)
         return line, view.node_rows(body, order)
-    surface, nodes, turns = master_nodes(case, body, boundary, f"{where}.master")
+    surface, nodes, turns = master_nodes(case, body, boundary, f"{where}.master", slave)
     return surface, master_rows(view, body, nodes, turns)
 
 
