@@ -61,6 +61,16 @@ def test_new_does_not_overwrite(folder: Path) -> None:
     assert stridor("new", "two-beams", "--force", cwd=folder).returncode == 0
 
 
+def test_new_refuses_a_folder_that_cannot_be_written_as_the_other_verbs_do(folder: Path) -> None:
+    told = [
+        stridor(*words, "--out", "two-beams.toml/in", cwd=folder)
+        for words in (("new", "pad-on-disc"), ("modes", "two-beams.toml"))
+    ]
+    assert [done.returncode for done in told] == [2, 2]
+    assert told[0].stderr == told[1].stderr
+    assert told[0].stderr.startswith("stridor: --out: 'two-beams.toml/in' – two-beams.toml is a file")
+
+
 def test_new_lists_templates(tmp_path: Path) -> None:
     done = stridor("new", "three-beams", cwd=tmp_path)
     assert done.returncode == 2

@@ -297,12 +297,49 @@ def test_includes_are_read_in_their_place(read, tmp_path):
     )
 
 
+def test_an_include_is_read_as_if_its_text_stood_there(read, tmp_path):
+    nodes = "*NODE, NSET=n\n1,0,0\n2,1,0\n3,1,1\n4,0,1\n5,2,0\n6,2,1\n"
+    cells = "*ELEMENT, TYPE=CPS4, ELSET=e\n1,1,2,3,4\n2,2,5,6,3\n*NSET, NSET=a\n1\n2\n"
+    lines = (nodes + cells).splitlines(keepends=True)
+    flat = read("".join(lines)).mesh
+    assert flat.cell_count == 2
+    assert flat.node_sets["a"].tolist() == [0, 1]
+    for start in range(len(lines)):
+        for end in range(start, len(lines) + 1, 3):
+            (tmp_path / "deep.txt").write_text("".join(lines[start:end][1:]))
+            (tmp_path / "part.txt").write_text("".join(lines[start:end][:1]) + "*INCLUDE, INPUT=deep.txt\n")
+            mesh = read("".join([*lines[:start], "*INCLUDE, INPUT=part.txt\n", *lines[end:]])).mesh
+            assert mesh.points.tolist() == flat.points.tolist()
+            assert mesh.cells["quad"].tolist() == flat.cells["quad"].tolist()
+            assert mesh.regions["e"]["quad"].tolist() == [0, 1]
+            assert {name: held.tolist() for name, held in mesh.node_sets.items()} == {"n": [*range(6)], "a": [0, 1]}
+    (tmp_path / "part.txt").write_text("** set\n7\n")
+    assert refused(lambda: read("".join(lines) + "*INCLUDE, INPUT=part.txt\n")) == (
+        "part.txt, line 2: '7' – node 7 is not defined"
+    )
+    (tmp_path / "part.txt").write_text("1,1,2,6,4\n")
+    assert refused(lambda: read(nodes + "*ELEMENT, TYPE=CPS4\n1,1,2,3,4\n*INCLUDE, INPUT=part.txt\n")) == (
+        "part.txt, line 1: '1,1,2,6,4' – element 1 is already defined in a.inp, line 9"
+    )
+    assert refused(lambda: read("*INCLUDE, INPUT=part.txt\n" + nodes)) == (
+        "part.txt, line 1: '1,1,2,6,4' – no keyword (*NODE, *ELEMENT, …) is above this line that says what it is"
+    )
+    (tmp_path / "part.txt").write_text("3,0,1\n*ELEMENT, TYPE=CPS3\n1,1,2,3\n")
+    assert refused(lambda: read("*NODE, INPUT=part.txt\n1,0,0\n2,1,0\n")) == (
+        "part.txt, line 2: '*ELEMENT, TYPE=CPS3' – INPUT of *NODE names a file of its data lines; for keywords: *INCLUDE"
+    )
+
+
 BASE = "*NODE\n1,0,0\n2,1,0\n3,0,1\n*ELEMENT,TYPE=CPS3,ELSET=e\n1,1,2,3\n"
 
 
 @pytest.mark.parametrize(
     ("text", "told"),
     [
+        (
+            "\n1,0,0\n*NODE\n",
+            "line 2: '1,0,0' – no keyword (*NODE, *ELEMENT, …) is above this line that says what it is",
+        ),
         ("*NODE\n1,0,0\n1,0,1\n", "line 3: '1,0,1' – node 1 is already defined, at another place"),
         ("*NODE\n1.5,0,0\n", "line 2: '1.5,0,0' – '1.5' is not the number of a node, a whole number from 1"),
         ("*NODE\n-1,0,0\n", "line 2: '-1,0,0' – '-1' is not the number of a node, a whole number from 1"),
@@ -368,7 +405,7 @@ def test_wrong_lines_are_told_with_file_and_number(read, text, told):
 def test_files_without_a_body(read):
     accepted = "CPS3, CPE3, CPS4, CPE4, CPS6, CPE6, CPS8, CPE8, C3D4, C3D8, C3D10, C3D20"
     nodes = "*NODE\n1,0,0\n2,1,0\n3,0,1\n4,1,1\n"
-    assert refused(lambda: read("nothing here\n")) == (
+    assert refused(lambda: read("*HEADING\nnothing here\n")) == (
         f"mesh.file: 'a.inp' – has no cells; a body needs some of: {accepted}"
     )
     shells = "*ELEMENT,TYPE=S4R,ELSET=shell\n1,1,2,4,3\n2,2,1,3,4\n*ELEMENT,TYPE=M3D3\n3,1,2,3\n*ELEMENT,TYPE=CAX4\n4,1,2,4,3\n"

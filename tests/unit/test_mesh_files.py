@@ -331,6 +331,31 @@ def wrong(tmp_path, cells, points=None, suffix="vtu"):
     return refused(path)
 
 
+def test_elements_of_an_entity_that_is_not_there_are_told_with_its_kind_and_number(tmp_path):
+    (tmp_path / "a.msh").write_text(TWO_QUADS.replace("\n2 2 3 1\n", "\n2 9 3 1\n"))
+    assert refused(tmp_path / "a.msh") == (
+        "a.msh, line 58: '2 9 3 1' – elements of surface 9, and $Entities has no surface of this number; save the file "
+        "from Gmsh again"
+    )
+    (tmp_path / "a.msh").write_text(TWO_QUADS.replace("\n2 2 3 1\n", "\n2 2 137 1\n"))
+    assert refused(tmp_path / "a.msh").endswith(": it has elements of type 137, which its reader does not know")
+    mesh = shapes.rectangle((0, 0), (1, 1), (1, 1))
+    raw = meshio.Mesh(np.column_stack([mesh.points, np.zeros(4)]), [("quad", mesh.cells["quad"])])
+    raw.cell_data["gmsh:physical"] = [np.array([1])]
+    raw.cell_data["gmsh:geometrical"] = [np.array([5])]
+    raw.point_data["gmsh:dim_tags"] = np.array([[2, 5]] * 4)
+    raw.write("b.msh", file_format="gmsh")
+    assert read_mesh("b.msh").cell_count == 1
+    data = (tmp_path / "b.msh").read_bytes()
+    at = data.index(b"$Elements\n") + len(b"$Elements\n") + 32
+    assert data[at : at + 8] == np.array([2, 5], dtype="i4").tobytes()
+    (tmp_path / "b.msh").write_bytes(data[:at] + np.array([2, 6], dtype="i4").tobytes() + data[at + 8 :])
+    assert refused(tmp_path / "b.msh") == (
+        "mesh.file: 'b.msh' – has elements of surface 6, and $Entities has no surface of this number; save the file "
+        "from Gmsh again"
+    )
+
+
 def test_cells_that_cannot_be_computed_with_are_named_and_counted(tmp_path):
     accepted = "triangle, triangle6, quad, quad8, quad9, tetra, tetra10, hexahedron, hexahedron20, hexahedron27"
     assert wrong(tmp_path, [("wedge", [range(6), range(6)]), ("pyramid", [range(5)]), ("tetra", [range(4)])]) == (

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 
 import stridor as st
 from matrix_cases import matrix_case
@@ -542,6 +543,34 @@ def test_the_program_prints_the_answer_and_draws(tmp_path: Path) -> None:
     with nothing_drawn():
         assert stridor("plot", "study.out/study.zarr", "--out", "elsewhere", cwd=tmp_path).returncode == 0
     assert {path.name for path in (tmp_path / "elsewhere").glob("*.png")} == drawn
+
+
+@pytest.mark.parametrize("words", [("study", "study.toml"), ("plot", "study.out")])
+def test_files_that_have_no_room_are_all_named_and_the_others_written(
+    case: st.Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, str]
+) -> None:
+    (tmp_path / "case.toml").write_text(case.text, encoding="utf-8")
+    text = 'case = "case.toml"\nsampling = { method = "grid" }\nparameters.mu.values = [0.1, 0.2]\n'
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    st.run_study(st.Study.load(tmp_path / "study.toml"), tmp_path / "study.out", workers=1)
+    names = ("first", "second", "third")
+    monkeypatch.setattr("stridor.studies.plots.study_figures", lambda _: {name: Figure((0.5, 0.5)) for name in names})
+    whole = Path.replace
+
+    def no_room(self: Path, target: Path) -> Path:
+        if Path(target).name in ("second.png", "report.html"):
+            raise OSError(28, "No space left on device")
+        return whole(self, target)
+
+    monkeypatch.setattr(Path, "replace", no_room)
+    done = stridor(*words, cwd=tmp_path)
+    assert done.returncode == 1
+    written = {path.name for path in (tmp_path / "study.out").glob("*.[pch]*")}
+    assert written == {"first.png", "third.png"} | ({"study.csv"} if words[0] == "study" else set())
+    assert "grow" in done.stdout  # the answer is there all the same
+    lost = [line for line in done.stderr.splitlines() if line.endswith(": No space left on device")]
+    assert [Path(line.split(": ")[0]).name for line in lost] == ["second.png", "report.html"]
+    assert done.stderr.endswith("study.zarr: the same command writes what is missing once there is room\n")
 
 
 def test_what_is_gone_of_a_store_is_not_taken_for_zeros(case: st.Case, tmp_path: Path) -> None:

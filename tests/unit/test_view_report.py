@@ -229,6 +229,24 @@ def test_equal_inputs_give_an_equal_page(tmp_path):
     assert write_report(inputs, tmp_path / "b").read_bytes() == first
 
 
+def test_a_case_without_damping_is_nowhere_said_to_have_any():
+    """Modes know what they were asked for, onsets whether there was any."""
+    for both in (True, False):
+        bare = {"undamped_sweep": None, "undamped_onsets": None, "undamped_pair": None}
+        inputs = full_inputs(damped_onsets=found_onsets(damped=False), **({} if both else bare))
+        chapter = next(c for c in sections(inputs) if c.name == "modal")
+        said = " ".join([*chapter.paragraphs, *chapter.lines, *(f"{part.title} {part.caption}" for part in chapter.parts)]).lower()
+        assert "without damping" in said
+        assert "with structural damping" not in said
+        assert not [text for text in (*chapter.paragraphs, *chapter.lines) if text.startswith("With damping")]
+        assert "onsets, damped" not in said
+        assert said.count("onsets, undamped") == 1
+        names = [part.name for part in chapter.parts]
+        assert len(names) == len(set(names))
+    chapter = next(c for c in sections(full_inputs()) if c.name == "modal")
+    assert {"Onsets, damped", "Onsets, undamped"} <= {part.title for part in chapter.parts}
+
+
 def test_an_older_page_stays_when_writing_fails(tmp_path, monkeypatch):
     inputs = ReportInputs(paper_case())
     before = write_report(inputs, tmp_path).read_bytes()

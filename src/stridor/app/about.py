@@ -28,6 +28,7 @@ def new(
     """Write a commented case file, ready to edit."""
     from ..case import loads, template_text
     from ..io.atomic import write_text
+    from ..io.claims import make_folder
     from .closing import command
     from .output import literal, print_json, say, stdout
 
@@ -38,6 +39,7 @@ def new(
     path = (out or Path()) / f"{template}.toml"
     if path.exists() and not force:
         raise CaseError("TEMPLATE", str(path), "a file that does not exist yet; remove it or add --force")
+    make_folder(path.parent)
     write_text(path, text)
     if json:
         print_json({"case": str(path)})

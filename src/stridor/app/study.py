@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import CaseError
+from ..errors import AnalysisError, CaseError
 from ..interrupts import INTERRUPTED, heard
 from .arguments import INCOMPLETE, Call, verb
 from .closing import Conclusion
@@ -95,13 +97,15 @@ def _merged(call: Call, study: Study) -> StudyResult:
 
 
 def _finish(call: Call, result: StudyResult, *, draw: bool) -> None:
-    """Write the table, the figures and the page; say what came out."""
-    files, left = [result.path], ""
+    """Write the table, the figures and the page; say what came out. Raises AnalysisError for all of them that cannot be
+    written, once the others are and what came out is said."""
+    written, left = _Written([result.path]), ""
     call.say(f"written: {result.path}")
     if draw:
-        drawn, left = _drawn(call, result)
-        files += [call.tabulate(result, "study.csv"), *drawn]
-    _show(call, result, files, left)
+        written.add(lambda: call.tabulate(result, "study.csv"))
+        left = _draw(call, result, written)
+    _show(call, result, written.files, left)
+    written.refuse(result)
     if result.interrupted:
         heard()
         call.say("interrupted; the same command goes on from there")
@@ -110,19 +114,43 @@ def _finish(call: Call, result: StudyResult, *, draw: bool) -> None:
         raise typer.Exit(INCOMPLETE)
 
 
-def _drawn(call: Call, result: StudyResult) -> tuple[list[Path], str]:
+@dataclass
+class _Written:
+    """Files that are written, and why others cannot be: a full disk has room for the small ones."""
+
+    files: list[Path] = field(default_factory=list)
+    lost: list[str] = field(default_factory=list)
+
+    def add(self, write: Callable[[], Path]) -> None:
+        """Write one more."""
+        try:
+            self.files.append(write())
+        except AnalysisError as error:
+            self.lost.append(str(error))
+
+    def refuse(self, result: StudyResult) -> None:
+        """Raises AnalysisError where any could not be written."""
+        if self.lost:
+            kept = f"the rows are in {result.path}: the same command writes what is missing once there is room"
+            raise AnalysisError("\n".join([*self.lost, kept]))
+
+
+def _draw(call: Call, result: StudyResult, written: _Written) -> str:
     """Figures and the page, beside the store; what they do not show."""
     from ..studies.page import write_page
     from ..studies.plots import study_figures
     from ..studies.summary import undrawn
 
+    def page() -> Path:
+        path = write_page(result, drawn, call.folder / "report.html")
+        call.say(f"written: {path}")
+        return path
+
     drawn = study_figures(result)
-    files: list[Path] = []
     for name, figure in drawn.items():
-        files.append(call.draw(figure, f"{name}.png"))
-    files.append(write_page(result, drawn, call.folder / "report.html"))
-    call.say(f"written: {files[-1]}")
-    return files, undrawn(result, len(drawn))
+        written.add(partial(call.draw, figure, f"{name}.png"))
+    written.add(page)
+    return undrawn(result, len(drawn))
 
 
 def _show(call: Call, result: StudyResult, files: list[Path], left: str) -> None:
@@ -147,7 +175,6 @@ def _show(call: Call, result: StudyResult, files: list[Path], left: str) -> None
 
 def document(result: StudyResult) -> dict[str, Any]:
     """The document of --json."""
-    from ..errors import AnalysisError
     from ..studies.summary import answer, failures
 
     found: dict[str, Any] = {
@@ -190,16 +217,18 @@ def plot(call: Call) -> None:
     if call.out is None:
         call = replace(call, out=result.path.parent)
     call.claim()
-    files, left = _drawn(call, result)
+    written = _Written()
+    left = _draw(call, result, written)
     if call.json:
         told = {"answer": answer(result), "failed": len(result.failed), "pending": result.pending, "undrawn": left}
-        call.document({**told, "notes": list(result.notes), "files": [str(f) for f in files]})
+        call.document({**told, "notes": list(result.notes), "files": [str(f) for f in written.files]})
     else:
         from .output import stdout
 
         for note in result.notes:  # what is not computed, failed, or not to be trusted
             stdout.print(note)
         call.conclude(Conclusion("; ".join(filter(None, (answer(result), left)))))
+    written.refuse(result)
     if len(result.failed) or result.pending:
         raise typer.Exit(INCOMPLETE)
 

@@ -19,6 +19,7 @@ from ..mesh.facets import Chain, chain_of
 from ..mesh.model import Blocks
 from ..typing import Array, IntArray
 from . import surface
+from .kinks import lone_kinks
 from .master import Location
 
 # Beyond an end by less than this part of a segment is still on the line.
@@ -44,9 +45,10 @@ class Curve:
 
     nodes (k,) are the mesh's own numbers of the curve's nodes, the order in which displacements and rows are
     expected. positions (k, 2) [m] undisplaced. A closed curve has no ends. Between segments that turn by more than
-    the corner angle the spline is broken, so that the side of a rectangle stays straight; off an outward corner the
-    gap is the distance from it. facets (f, 3): first, last and middle node (−1 for linear facets) of the curve's
-    numbering, as the finite elements interpolate.
+    the corner angle, or by far more than at the nodes around (`kinks`), the spline is broken, so that the side of a
+    rectangle and the flat beside a chamfer stay straight; off an outward corner the gap is the distance from it.
+    facets (f, 3): first, last and middle node (−1 for linear facets) of the curve's numbering, as the finite elements
+    interpolate.
     stencils (c, 4): nodes that shape each of the c segments, negative where the spline begins or ends; chords (c, 3):
     undisplaced lengths [m] of the segments before, of and after it. before, after (c,): segments that continue it
     smoothly, −1 at ends and corners. follows_spline: whether displacements are interpolated as positions are, by the
@@ -85,8 +87,12 @@ class Curve:
         length = np.linalg.norm(chord, axis=1)
         direction = chord / length[:, None]
         previous, following = (start - 1) % count, (start + 1) % count
-        turn = np.sum(direction * direction[previous], axis=1)  # cosine at the start of each segment
-        smooth = turn >= np.cos(np.radians(corner_deg))
+        cosine = np.sum(direction * direction[previous], axis=1)  # at the start of each segment
+        smooth = cosine >= np.cos(np.radians(corner_deg))
+        turn = np.arctan2(direction[previous, 0] * direction[:, 1] - direction[previous, 1] * direction[:, 0], cosine)
+        middle = np.zeros(len(positions), dtype=bool)
+        middle[chain.facets[:, 2][chain.facets[:, 2] >= 0]] = True
+        smooth &= ~lone_kinks(turn, length, middle[:count], ~smooth, closed=chain.closed)
         if not chain.closed:
             smooth[0] = False
         before = np.where(smooth, previous, -1)

@@ -46,7 +46,7 @@ def claimed(folder: Path, parts: Sequence[str] = (), *, where: str = "--out") ->
     parts: folders in it that will be written, which may be there. Raises CaseError where it cannot be written or
     another process is at it.
     """
-    made = _make(folder, where)
+    made = make_folder(folder, where)
     resolved = folder.resolve()
     if resolved in _own:
         yield folder
@@ -74,8 +74,8 @@ def claimed(folder: Path, parts: Sequence[str] = (), *, where: str = "--out") ->
                 each.rmdir()
 
 
-def _make(folder: Path, where: str) -> list[Path]:
-    """Make a folder and those above it; those that were made. Raises CaseError."""
+def make_folder(folder: Path, where: str = "--out") -> list[Path]:
+    """Make a folder and those above it; those that were made. Raises CaseError, where it cannot be written, too."""
     missing: list[Path] = []
     at = folder
     while not os.path.lexists(at) and at != at.parent:

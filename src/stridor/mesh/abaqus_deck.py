@@ -6,7 +6,7 @@ Comments are left out, included files put in their place, keywords and names of 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
@@ -84,43 +84,47 @@ class Card:
 
 
 def read_deck(file: Path) -> list[Card]:
-    """Cards of a file and of what it includes. Raises CaseError with file and line."""
+    """Cards of a file, with what it includes in its place. Raises CaseError with file and line."""
     cards: list[Card] = []
-    for card in _cards(_lines(file, None), file, ()):
-        cards.append(card)
+    _take(_lines(file, None), file, (), cards)
     return cards
 
 
-def _cards(lines: list[DeckLine], file: Path, above: tuple[Path, ...]) -> Iterator[Card]:
-    """Cards of lines; above: the files that include this one."""
-    card: Card | None = None
+def _take(lines: list[DeckLine], file: Path, above: tuple[Path, ...], cards: list[Card]) -> None:
+    """Adds lines to the cards so far; above: the files that include this one.
+
+    *INCLUDE stands for the text of its file: it ends no card. What the file begins with goes on with the card before
+    it, and what follows the include with the last card of the file. Raises CaseError, for data that no keyword is
+    above, too.
+    """
     at = 0
     while at < len(lines):
         line = lines[at]
         at += 1
         if not line.text.startswith("*"):
-            if card is not None:
-                card.data.append(line)
+            if not cards:
+                line.refuse("no keyword (*NODE, *ELEMENT, …) is above this line that says what it is")
+            cards[-1].data.append(line)
             continue
         text = line.text
         while text.endswith(",") and at < len(lines) and _continues(lines[at].text):
             text += lines[at].text
             at += 1
-        if card is not None:
-            yield card
         card = _card(text, line)
+        if card.keyword != "INCLUDE":
+            cards.append(card)
         if card.keyword == "INCLUDE" or (card.keyword in _DATA_FROM_FILES and "INPUT" in card.options):
             other = file.parent / card.need("INPUT")
             if other in (file, *above):
                 line.refuse("this file is already being read; a file cannot include itself")
             included = _lines(other, line)
-            if card.keyword != "INCLUDE":
-                card.data += [entry for entry in included if not entry.text.startswith("*")]
-            else:
-                card = None
-                yield from _cards(included, other, (file, *above))
-    if card is not None:
-        yield card
+            if card.keyword == "INCLUDE":
+                _take(included, other, (file, *above), cards)
+                continue
+            for entry in included:
+                if entry.text.startswith("*"):
+                    entry.refuse(f"INPUT of *{card.keyword} names a file of its data lines; for keywords: *INCLUDE")
+            card.data += included
 
 
 def _continues(text: str) -> bool:

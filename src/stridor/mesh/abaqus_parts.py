@@ -160,7 +160,8 @@ class PartsReader:
             element = ElementRecord(kind, tuple(found[1:]), first)
             known = self._scope.elements.setdefault(found[0], element)
             if known is not element and (known.kind, known.nodes) != (element.kind, element.nodes):
-                first.refuse(f"element {found[0]} is already defined in line {known.line.number}")
+                there = "" if known.line.file == first.file else f"{known.line.file}, "
+                first.refuse(f"element {found[0]} is already defined in {there}line {known.line.number}")
             numbers.append(found[0])
         self.types[type_name] = self.types.get(type_name, 0) + len(numbers)
         if card.options.get("ELSET"):

@@ -91,6 +91,8 @@ def _through_meshio(file: Path, suffix: str, where: str) -> Any:
             reason = "it breaks off, or holds something else where numbers should be"
         elif suffix == ".msh" and "ncompatible cell data" in reason:
             reason = 'only part of its elements is in physical groups; save it from Gmsh without "Save all elements"'
+        elif suffix == ".msh" and isinstance(error, KeyError):
+            reason = f"it has elements of type {error.args[0]}, which its reader does not know"
         elif isinstance(error, IndexError | ValueError) and not isinstance(error, UnicodeError):
             # What Python says of a list that is too short is nothing that a user could mend.
             reason = f"it breaks off, or holds something else where numbers should be ({reason})"

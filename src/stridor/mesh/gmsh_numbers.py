@@ -1,5 +1,6 @@
 """Numbers of nodes in Gmsh's files, looked through before a reader takes them for places in an array, and how many
-there are against what the file says: a reader that stops at the count loses the rest without a word.
+there are against what the file says: a reader that stops at the count loses the rest without a word. And the entities
+that elements of format 4.1 are of, which the reader looks up for their physical groups.
 
 Nodes are numbered from 1. A reader that subtracts 1 takes node 0 for the last one, and a number that two nodes have for
 the second of them; here the line is named instead (of binary files the element).
@@ -24,19 +25,20 @@ _NODES = {
     **{17: 20, 18: 15, 19: 13, 20: 9, 21: 10, 22: 12, 23: 15, 24: 15, 25: 21, 26: 4, 27: 5, 28: 6, 29: 20, 30: 35},
     **{31: 56, 36: 16, 37: 25, 92: 64, 93: 125},
 }
-_SECTION = re.compile(rb"^\$(MeshFormat|Nodes|Elements)[ \t\r]*\n", re.MULTILINE)
+_SECTION = re.compile(rb"^\$(MeshFormat|Entities|Nodes|Elements)[ \t\r]*\n", re.MULTILINE)
 # Readers make an array as long as the largest number: so far beyond the count of nodes it is a slip.
 _LARGEST = 2**31 - 1
 _SPARSE = 1000
 _ALWAYS = 10_000_000
+_ENTITIES = ("point", "curve", "surface", "volume")
 _MEND = "correct the number or the lines, or save the file from Gmsh again"
 
 
 def check_numbers(file: Path, where: str) -> None:
     """Raise CaseError for nodes numbered below 1, twice or absurdly high, for elements with a node that is not there,
-    and for more or fewer of them than the file says: at "FILE, line N" for text, at ``where`` for binary files; in
-    binary files of format 2.2 for nodes in another order than 1, 2, …. What is broken otherwise is left to the
-    reader."""
+    for more or fewer of them than the file says, and for elements of an entity that it lacks: at "FILE, line N" for
+    text, at ``where`` for binary files; in binary files of format 2.2 for nodes in another order than 1, 2, …. What is
+    broken otherwise is left to the reader."""
     data = file.read_bytes()
     sections = {found[1]: found.end() for found in reversed(list(_SECTION.finditer(data)))}
     if not {b"MeshFormat", b"Nodes", b"Elements"} <= set(sections):
@@ -69,11 +71,20 @@ def _check_text(file: Path, data: bytes, sections: dict[bytes, int], *, old: boo
 
         nodes, closed = section == b"Nodes", end >= 0
         try:
-            rows = _rows_22(lines, refuse, nodes, closed) if old else _rows_41(lines, refuse, nodes, closed)
+            heads: Heads = []
+            if old:
+                rows = _rows_22(lines, refuse, nodes, closed)
+            else:
+                rows, heads = _rows_41(lines, refuse, nodes, closed)
             for offset, words, kind in rows:
                 take(offset, words, kind, known, refuse)
         except (ValueError, IndexError):
             return  # the reader says what is no number
+        if not nodes and not old and b"Entities" in sections:
+            held = _entities(data, sections[b"Entities"], binary=False)
+            for offset, dimension, tag in heads:
+                if text := _missing_entity(held, dimension, tag):
+                    refuse(offset, text)
         if nodes and known and (highest := max(known)) > max(_ALWAYS, _SPARSE * len(known)):
             for offset, words, _ in rows:
                 if int(words[0]) == highest:
@@ -81,6 +92,7 @@ def _check_text(file: Path, data: bytes, sections: dict[bytes, int], *, old: boo
 
 
 Rows = list[tuple[int, list[bytes], int]]
+Heads = list[tuple[int, int, int]]  # offset of each block, dimension and number of its entity
 Refuse = Callable[[int, str], NoReturn]
 
 
@@ -95,20 +107,20 @@ def _rows_22(lines: list[bytes], refuse: Refuse, nodes: bool, closed: bool) -> R
     return rows
 
 
-def _rows_41(lines: list[bytes], refuse: Refuse, nodes: bool, closed: bool) -> Rows:
-    """Numbers of nodes of format 4.1, or of elements and their nodes, with their offsets and types of elements; none of
-    a file that breaks off. Refuses more or fewer of them than the first line of the section says."""
+def _rows_41(lines: list[bytes], refuse: Refuse, nodes: bool, closed: bool) -> tuple[Rows, Heads]:
+    """Numbers of nodes of format 4.1, or of elements and their nodes, with their offsets and types of elements, and the
+    heads of their blocks; none of a file that breaks off. Refuses more or fewer of them than the first line of the
+    section says."""
     held = [(offset, words) for offset, line in enumerate(lines) if (words := line.split())]
     (first, head), *follow = held
     blocks, total = int(head[0]), int(head[1])
     expected = blocks + (2 if nodes else 1) * total  # a node has a line for its number and one for its place
     if len(follow) < expected and not closed:
-        return []
-    rows, found = _by_lines(follow, refuse, nodes)
-    if len(rows) != total or found != blocks:
-        rows, found = _by_numbers(follow, nodes)
-    if len(rows) == total and found == blocks:
-        return rows
+        return [], []
+    for read in (_by_lines, _by_numbers):
+        rows, heads = read(follow, refuse, nodes)
+        if heads is not None and len(rows) == total and len(heads) == blocks:
+            return rows, heads
     what = "Nodes" if nodes else "Elements"
     if len(follow) != expected:
         ends = f"which are {expected} lines, and {len(follow)} lines follow"
@@ -117,42 +129,84 @@ def _rows_41(lines: list[bytes], refuse: Refuse, nodes: bool, closed: bool) -> R
     refuse(first, f"${what} says {total} {what.lower()} in {blocks} blocks, {ends}; {_MEND}")
 
 
-def _by_lines(held: list[tuple[int, list[bytes]]], refuse: Refuse, nodes: bool) -> tuple[Rows, int]:
-    """Rows, and the number of blocks, where a head, a number, a place and an element have a line each; none where the
+def _by_lines(held: list[tuple[int, list[bytes]]], refuse: Refuse, nodes: bool) -> tuple[Rows, Heads | None]:
+    """Rows, and the heads of blocks, where a head, a number, a place and an element have a line each; None where the
     lines do not make up whole blocks."""
     rows: Rows = []
-    at = blocks = 0
+    heads: Heads = []
+    at = 0
     while at < len(held):
         offset, head = held[at]
         if len(head) != 4:
-            return [], -1
+            return [], None
         kind, count = int(head[2]), int(head[3])
         if count < 0:
             refuse(offset, f"a block of {count} {'nodes' if nodes else 'elements'}; there are none or some")
-        at, blocks = at + 1, blocks + 1
+        heads.append((offset, int(head[0]), int(head[1])))
+        at += 1
         rows += [(offset, words, 0 if nodes else -kind) for offset, words in held[at : at + count]]
         at += count * (2 if nodes else 1)
-    return (rows, blocks) if at == len(held) else ([], -1)
+    return rows, (heads if at == len(held) else None)
 
 
-def _by_numbers(held: list[tuple[int, list[bytes]]], nodes: bool) -> tuple[Rows, int]:
+def _by_numbers(
+    held: list[tuple[int, list[bytes]]], refuse: Refuse, nodes: bool
+) -> tuple[Rows, Heads | None]:
     """The same where the numbers are spread over lines in any way, as readers take them."""
+    del refuse
     words = [(offset, word) for offset, line in held for word in line]
     rows: Rows = []
-    at = blocks = 0
+    heads: Heads = []
+    at = 0
     while at < len(words):
         try:
-            kind, count = int(words[at + 2][1]), int(words[at + 3][1])
+            dimension, tag, kind, count = (int(words[at + n][1]) for n in range(4))
         except (ValueError, IndexError):
-            return [], -1
+            return [], None
         if count < 0 or (not nodes and kind not in _NODES):
-            return [], -1
-        at, blocks = at + 4, blocks + 1
+            return [], None
+        heads.append((words[at][0], dimension, tag))
+        at += 4
         width = 1 if nodes else 1 + _NODES[kind]
         for start in range(at, min(at + count * width, len(words)), width):
             rows.append((words[start][0], [word for _, word in words[start : start + width]], 0 if nodes else -kind))
         at += count * (4 if nodes else width)
-    return (rows, blocks) if at == len(words) else ([], -1)
+    return rows, (heads if at == len(words) else None)
+
+
+def _entities(data: bytes, start: int, *, binary: bool) -> list[set[int]] | None:
+    """Numbers of the entities of dimension 0 to 3; None where the section breaks off, which the reader tells."""
+    words = iter(() if binary else data[start : max(data.find(b"$", start), start)].split())
+    at = start
+
+    def take(kind: str, count: int) -> list[float]:
+        nonlocal at
+        if not binary:
+            return [float(next(words)) for _ in range(count)]
+        found = np.frombuffer(data, kind, count, at)
+        at += found.nbytes
+        return found.tolist()
+
+    held: list[set[int]] = []
+    try:
+        for dimension, total in enumerate(take("u8", 4)):
+            held.append(set())
+            for _ in range(int(total)):
+                held[dimension].add(int(take("i4", 1)[0]))
+                take("f8", 6 if dimension else 3)
+                for _ in range(2 if dimension else 1):  # physical groups, and what bounds it
+                    take("i4", int(take("u8", 1)[0]))
+    except (ValueError, IndexError, OverflowError, StopIteration):
+        return None
+    return held
+
+
+def _missing_entity(held: list[set[int]] | None, dimension: int, tag: int) -> str:
+    """What is wrong with elements of an entity; "" for nothing."""
+    if held is None or not 0 <= dimension < len(_ENTITIES) or tag in held[dimension]:
+        return ""
+    name = _ENTITIES[dimension]
+    return f"elements of {name} {tag}, and $Entities has no {name} of this number; save the file from Gmsh again"
 
 
 def _take_node(offset: int, words: list[bytes], kind: int, known: set[int], refuse: Refuse) -> None:
@@ -268,8 +322,12 @@ def _binary_41(data: bytes, sections: dict[bytes, int]) -> tuple[IntArray, list[
     blocks, said = (int(n) for n in numbers("u8", 2, at))
     at += 32
     elements: list[IntArray] = []
+    held = _entities(data, sections[b"Entities"], binary=True) if b"Entities" in sections else None
     for _ in range(blocks):
-        kind, count = int(numbers("i4", 3, at)[2]), int(numbers("u8", 1, at + 12)[0])
+        dimension, tag, kind = (int(n) for n in numbers("i4", 3, at))
+        count = int(numbers("u8", 1, at + 12)[0])
+        if not text and (missing := _missing_entity(held, dimension, tag)):
+            text = f"has {missing}"
         width = 1 + _NODES.get(kind, 0)
         if kind not in _NODES:
             break

@@ -50,7 +50,7 @@ def modal_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
     if onset is not None and onset.kind == "flutter":
         if undamped is not None and _holds(undamped, onset):
             yield from _undamped_pair(inputs, undamped, onset)
-        if damped is not None and _holds(damped, onset):
+        if damped is not None and not inputs.nothing_damps and _holds(damped, onset):
             yield from _damped_pair(inputs, damped, onset)
     yield from _all_branches(inputs)
     if inputs.curve is not None and len(inputs.curve.mu) > 1:
@@ -137,16 +137,16 @@ def _damped(inputs: ReportInputs) -> tuple[Onset, ...]:
 
 
 def _all_branches(inputs: ReportInputs) -> Iterator[ReportFigure]:
-    for modes, onsets, name, words in (
-        (inputs.undamped_sweep, inputs.undamped_onsets, "frequencies", "without damping"),
-        (inputs.damped_sweep, inputs.damped_onsets, "frequencies-damped", "with structural damping"),
+    for modes, onsets, name in (
+        (inputs.undamped_sweep, inputs.undamped_onsets, "frequencies"),
+        (inputs.damped_sweep, inputs.damped_onsets, "frequencies-damped"),
     ):
         if modes is None or len(modes.mu) < 2 or (name == "frequencies-damped" and inputs.undamped_sweep is not None):
             continue
         shown = int((modes.frequency_hz.min(axis=0) <= inputs.max_frequency_hz).sum())
         yield ReportFigure(
             name,
-            f"The first {shown} frequencies over friction, {words}",
+            f"The first {shown} frequencies over friction, {inputs.damping_of(modes)}",
             "Every line is one mode, followed from μ = 0 through crossings and coalescences. Circles: potentially "
             "unstable (the mode grows). Diamonds: onsets, solved.",
             f"Frequencies of {shown} modes over the friction coefficient with unstable stretches marked.",
@@ -156,8 +156,8 @@ def _all_branches(inputs: ReportInputs) -> Iterator[ReportFigure]:
         yield ReportFigure(
             "root-locus",
             "Root locus",
-            "Eigenvalues as friction grows, with structural damping. The horizontal axis is linear near zero and "
-            "logarithmic beyond.",
+            f"Eigenvalues as friction grows, {inputs.damping_of(inputs.damped_sweep)}. The horizontal axis is "
+            "linear near zero and logarithmic beyond.",
             "Eigenvalues in the plane of growth rate and frequency, coloured by friction coefficient.",
             plots.root_locus(inputs.damped_sweep, max_frequency_hz=inputs.max_frequency_hz),
         )

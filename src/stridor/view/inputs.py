@@ -122,6 +122,21 @@ class ReportInputs:
         return self.undamped_onsets if self.damped_onsets is None else self.damped_onsets
 
     @property
+    def nothing_damps(self) -> bool:
+        """Whether the onsets that were asked for with damping had none: the case has none, or leaves it out."""
+        return self.damped_onsets is not None and not self.damped_onsets.damped
+
+    @property
+    def told_onsets(self) -> tuple[Onsets, ...]:
+        """Onsets without damping and with it; those of a case without any once."""
+        both = () if self.nothing_damps and self.undamped_onsets is not None else (self.damped_onsets,)
+        return tuple(onsets for onsets in (self.undamped_onsets, *both) if onsets is not None)
+
+    def damping_of(self, modes: ComplexModes) -> str:
+        """Whether modes are with damping, in words. They know what was asked for, onsets what there is."""
+        return "with structural damping" if modes.damped and not self.nothing_damps else "without damping"
+
+    @property
     def dominant_hz(self) -> float | None:
         """Dominant frequency of the run at mu, from the comparison or the operating shape [Hz]; of a run that still
         grows there is none."""

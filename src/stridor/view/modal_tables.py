@@ -105,14 +105,12 @@ def onset_tables(inputs: ReportInputs) -> list[Table]:
     """Onsets beside printed ones, and how well each is solved."""
     tables: list[Table] = []
     printed = inputs.case.reference.onsets if inputs.case.reference else ()
-    for onsets, name in ((inputs.undamped_onsets, "undamped"), (inputs.damped_onsets, "damped")):
-        if onsets is None:
-            continue
+    for onsets in inputs.told_onsets:
         if not onsets.onsets:
             continue
-        tables.append(_onsets(onsets, name, printed))
+        tables.append(_onsets(onsets, "damped" if onsets.damped else "undamped", printed))
         printed = ()  # compared once
-    solved = [onset for o in (inputs.undamped_onsets, inputs.damped_onsets) if o is not None for onset in o.onsets]
+    solved = [onset for o in inputs.told_onsets for onset in o.onsets]
     if solved:
         tables.append(_solutions(solved))
     return tables
@@ -225,8 +223,8 @@ def _solutions(found: list[Onset]) -> Table:
     )
 
 
-def modes_table(modes: ComplexModes, mu: float, max_frequency_hz: float) -> Table:
-    """Complex modes at one μ, by frequency."""
+def modes_table(modes: ComplexModes, mu: float, max_frequency_hz: float, damping: str) -> Table:
+    """Complex modes at one μ, by frequency; damping: whether they are with it, in words."""
     row = modes.at(mu)
     order = [int(b) for b in modes.order(row) if modes.frequency_hz[row, b] <= max_frequency_hz]
     rows = tuple(
@@ -246,7 +244,6 @@ def modes_table(modes: ComplexModes, mu: float, max_frequency_hz: float) -> Tabl
         for b in order
     )
     heads = ("mode", "frequency [Hz]", "growth rate [1/s]", "damping ratio [%]", "", "residual")
-    damping = "with structural damping" if modes.damped else "without damping"
     caption = f"Up to {max_frequency_hz / 1e3:g} kHz, {damping}. Growth rate is Re λ: positive grows."
     if modes.completeness:
         caption += f" {modes.completeness[row]}"

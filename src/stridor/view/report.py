@@ -143,11 +143,10 @@ def _modal(inputs: ReportInputs) -> Chapter:
     parts.extend(() if mechanisms is None else (mechanisms,))
     if inputs.modes is not None:
         mu = float(inputs.modes.mu[0]) if inputs.mu is None else inputs.mu
-        parts.append(modes_table(inputs.modes, mu, inputs.max_frequency_hz))
+        parts.append(modes_table(inputs.modes, mu, inputs.max_frequency_hz, inputs.damping_of(inputs.modes)))
     said: list[str] = []
-    for onsets, damping in ((inputs.undamped_onsets, "Without damping"), (inputs.damped_onsets, "With damping")):
-        if onsets is None:
-            continue
+    for onsets in inputs.told_onsets:
+        damping = "With damping" if onsets.damped else "Without damping"
         said.extend(f"{damping} it {line}." for line in onsets.at_start_words)
         said.extend(f"{damping}: {line[2:]}." for line in onsets.from_above_words)
         if onsets.completeness:

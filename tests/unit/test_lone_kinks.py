@@ -1,0 +1,125 @@
+"""Edges of plane masters by how a line turns at a node against the nodes around: a chamfer is one, an arc has none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import stridor as st
+from stridor.contact.curve import Curve
+
+
+def line(points, *, closed: bool = False, quadratic: bool = False) -> Curve:
+    """The curve through points (k, 2); of quadratic facets every second is a middle."""
+    count = len(points)
+    start = np.arange(count if closed else count - 1)
+    blocks = {"line": np.stack([start, (start + 1) % count], axis=1)}
+    if quadratic:
+        start = start[::2]
+        blocks = {"line3": np.stack([start, (start + 2) % count, start + 1], axis=1)}
+    return Curve.from_facets(np.asarray(points, dtype=float), blocks, where="contacts.face.master")
+
+
+def arc(angles, radius: float = 1.0):
+    return radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+
+
+def divided(points, parts: int):
+    """Each segment of a closed line in parts, nodes on its chord."""
+    share = np.arange(parts)[None, :, None] / parts
+    return (points[:, None] * (1 - share) + np.roll(points, -1, axis=0)[:, None] * share).reshape(-1, 2)
+
+
+def chamfered(facets: int, angle_deg: float):
+    """The face of a pad of 40 mm whose chamfers take 4 mm at both ends."""
+    x = np.linspace(0.0, 40.0, facets + 1)
+    off = np.clip(4.0 - np.minimum(x, 40.0 - x), 0.0, None)
+    return np.stack([x, off * np.tan(np.radians(angle_deg))], axis=1)
+
+
+@pytest.mark.parametrize("angle_deg", [-20.0, 0.3, 2.0, 20.0, 39.0])
+@pytest.mark.parametrize("facets", [10, 20, 80])
+def test_chamfers_are_edges_at_any_angle_between_runs_of_facets(facets, angle_deg):
+    curve = line(chamfered(facets, angle_deg))
+    assert curve.positions[curve.corners, 0] == pytest.approx([4.0, 36.0])
+    assert curve.chord_height == pytest.approx(0.0, abs=1e-14)
+    if facets == 10 and angle_deg == 39.0:
+        return  # between its corner of 51° and a chamfer of one facet, it might be a coarse fillet
+    whole = np.concatenate([chamfered(facets, angle_deg), [[40.0, 12.0], [20.0, 12.0], [0.0, 12.0]]])
+    curve = line(whole, closed=True)
+    assert len(curve.corners) == 6
+    if facets == 20:
+        assert line(chamfered(facets, angle_deg), quadratic=True).corners.tolist() == [2, 18]
+
+
+def test_no_arc_has_edges_whatever_the_lengths_of_its_facets():
+    rng = np.random.default_rng(3)
+    for _ in range(60):
+        steps = rng.uniform(0.03, 1.0, rng.integers(24, 60)) ** rng.integers(1, 4)
+        angles = np.cumsum(steps) / steps.sum() * rng.uniform(0.1, 1.0)
+        assert not len(line(arc(angles)).corners)
+        steps = rng.uniform(0.1, 1.0, 40)
+        assert not len(line(arc(2 * np.pi * np.cumsum(steps) / steps.sum()), closed=True).corners)
+    ellipse = arc(np.linspace(0, 2 * np.pi, 90, endpoint=False)) * [3.0, 1.0]
+    assert not len(line(ellipse, closed=True).corners)
+
+
+@pytest.mark.parametrize(("facets", "turn", "edges"), [(1, 30, 0), (2, 60, 0), (3, 90, 0), (8, 90, 0), (2, 90, 1)])
+def test_a_fillet_between_straight_sides_has_no_edges_but_sharp_ones(facets, turn, edges):
+    angles = np.radians(np.linspace(-90.0, -90.0 + turn, facets + 1))
+    bent = arc(angles) + np.array([0.0, 1.0])
+    along = np.array([-np.sin(angles[-1]), np.cos(angles[-1])])
+    before = np.stack([np.arange(-5.0, 0.0), np.zeros(5)], axis=1)
+    curve = line(np.concatenate([before, bent, bent[-1] + np.arange(1.0, 6.0)[:, None] * along]))
+    assert len(curve.corners) == edges
+
+
+@pytest.mark.parametrize("parts", [2, 5])
+def test_a_curve_whose_facets_were_divided_on_their_chords_is_still_one(parts):
+    ring = divided(arc(np.linspace(0, 2 * np.pi, 24, endpoint=False)), parts)
+    assert not len(line(ring, closed=True).corners)
+    assert not len(line(ring[: 9 * parts + 1]).corners)
+    if parts == 2:
+        assert not len(line(ring, closed=True, quadratic=True).corners)
+        assert not len(line(ring[:19], quadratic=True).corners)
+
+
+def test_a_line_that_turns_once_and_a_single_node_between_two_facets():
+    assert not len(line([[0, 0], [1, 0], [2, 0.3]]).corners)  # nothing tells an arc of two facets from a kink
+    assert line([[0, 0], [1, 0], [2, 0], [3, 0.3], [4, 0.6]]).corners.tolist() == [2]
+    assert line([[0, 0], [1, 0], [2, 0], [3, 0.3]]).corners.tolist() == [2]
+
+
+def test_a_flat_slave_touches_all_of_the_flat_of_a_chamfered_master(tmp_path, monkeypatch):
+    """A spline through the kinks bulges out of the flat beside them by 0.05 mm: two nodes would touch."""
+    monkeypatch.chdir(tmp_path)
+    x = np.linspace(0.0, 0.04, 21)
+    low = 1e-3 * chamfered(20, 20.0)[:, 1]
+    lines = ["*NODE"]
+    for row, share in enumerate((0.0, 0.5, 1.0)):
+        lines += [f"{100 * row + i + 1}, {x[i]:.12g}, {low[i] * (1 - share) + 0.012 * share:.12g}" for i in range(21)]
+    lines.append("*ELEMENT, TYPE=CPS4, ELSET=all")
+    for row in range(2):
+        for i in range(1, 21):
+            a = 100 * row + i
+            lines.append(f"{a + 1000}, {a}, {a + 1}, {a + 101}, {a + 100}")
+    lines += ["*NSET, NSET=low, GENERATE", "1, 21", "*NSET, NSET=high, GENERATE", "201, 221"]
+    (tmp_path / "pad.inp").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    body = {"type": "solid", "model": "plane stress", "thickness": 0.01, "material": "iron"}
+    block = {"shape": "rectangle", "corner": [-0.02, -0.02], "size": [0.08, 0.02], "divisions": [40, 2], "cells": "quad"}
+    case = st.Case(
+        materials={"iron": {"young_modulus": 1e11, "density": 7200.0, "poisson_ratio": 0.27}},
+        bodies={"disc": body | {"mesh": block, "sliding": {"velocity": [1.0, 0.0]}}, "pad": body | {"file": "pad.inp"}},
+        supports={"ground": {"at": "disc.bottom", "fixed": ["x", "y"]}, "abutment": {"at": "pad.high", "fixed": ["x"]}},
+        loads={"piston": {"at": "pad.high", "pressure": 1e5}},
+        contacts={
+            "face": {
+                "slave": "disc.top", "master": "pad.low", "stiffness": 1e13,
+                "friction": {"law": "coulomb", "coefficient": 0.3},
+            }
+        },
+    )  # fmt: skip
+    steady = st.steady_sliding(case, 0.3)
+    assert not [w for w in steady.warnings if "curved" in w]
+    assert int(steady.active.sum()) == 17  # of 2 mm on 32 mm, both edges touched
+    assert steady.resultants["face"].force[1] == pytest.approx(-40.0)
