@@ -84,6 +84,37 @@ def test_a_curve_whose_facets_were_divided_on_their_chords_is_still_one(parts):
         assert not len(line(ring[:19], quadratic=True).corners)
 
 
+@pytest.mark.parametrize("turned", [0.0, 1.0, 2.5])
+@pytest.mark.parametrize(
+    ("angle_deg", "own_deg", "seen_deg"),
+    # Out of the flat at 0°, out of the chamfer at −20°: what the slave looks against, and what is taken of it.
+    [(20.0, 0.0, 0.0), (20.0, -7.0, -7.0), (20.0, 12.0, 0.0), (20.0, -35.0, -20.0), (60.0, -35.0, -35.0)],
+)
+def test_a_slave_at_a_corner_looks_its_own_way_between_those_of_the_sides(turned, angle_deg, own_deg, seen_deg):
+    def at(deg: float):
+        return np.array([np.sin(np.radians(deg) + turned), -np.cos(np.radians(deg) + turned)])
+
+    turn = np.array([[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]])
+    curve = line(chamfered(20, angle_deg) @ turn.T)
+    slave = np.array([[4.0, 0.0]]) @ turn.T
+    for moved in (0.0, 1e-9, -1e-9):
+        there = slave + moved * turn[:, 0]
+        found = curve.at_corners(curve.locate(there), there, -at(own_deg)[None])
+        assert found.normal[0] == pytest.approx(at(seen_deg), abs=1e-12)
+        assert abs(found.gap[0]) < 2e-9
+    unknown = curve.at_corners(curve.locate(slave), slave, np.zeros((1, 2)))
+    assert unknown.normal == pytest.approx(curve.locate(slave).normal)
+    beside = slave + 0.01 * turn[:, 0]
+    assert curve.at_corners(curve.locate(beside), beside, -at(-7.0)[None]).normal[0] == pytest.approx(at(0.0))
+
+
+def test_into_a_notch_a_slave_has_no_choice():
+    curve = line([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, -1.0], [4.0, -2.0]])
+    slave = np.array([[2.0, 0.0]])
+    found = curve.locate(slave)
+    assert curve.at_corners(found, slave, np.array([[0.3, 1.0]])).normal == pytest.approx(found.normal)
+
+
 def test_a_line_that_turns_once_and_a_single_node_between_two_facets():
     assert not len(line([[0, 0], [1, 0], [2, 0.3]]).corners)  # nothing tells an arc of two facets from a kink
     assert line([[0, 0], [1, 0], [2, 0], [3, 0.3], [4, 0.6]]).corners.tolist() == [2]
@@ -123,3 +154,5 @@ def test_a_flat_slave_touches_all_of_the_flat_of_a_chamfered_master(tmp_path, mo
     assert not [w for w in steady.warnings if "curved" in w]
     assert int(steady.active.sum()) == 17  # of 2 mm on 32 mm, both edges touched
     assert steady.resultants["face"].force[1] == pytest.approx(-40.0)
+    # Nodes on the corners look the way of the slave: the support above takes friction alone.
+    assert abs(steady.resultants["face"].force[0]) == pytest.approx(0.3 * 40.0, rel=1e-12)

@@ -9,7 +9,7 @@ derivative of the gap: dg = n · (du_slave − Σ weights du_master), at any gap
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -203,6 +203,35 @@ class Curve:
         side = np.where(np.sum(mean * offset, axis=1) < 0, -1.0, 1.0)
         scaled = side[:, None] * offset / np.where(apart, distance, 1.0)[:, None]
         return np.where(apart[:, None], scaled, mean)
+
+    def at_corners(self, location: Location, slaves: Array, slave_normals: Array) -> Location:
+        """Places of undisplaced slaves (m, 2) [m] where those that lie at an outward corner look the way their own
+        normals (m, 2) say, as far as the normals of both sides of the corner enclose that.
+
+        Which of its sides is nearer there rounding decides. Slaves without a normal keep that side's.
+        """
+        count, xi = len(self.chords), np.zeros(len(slaves)) if location.local is None else location.local[:, 0]
+        at = self.stencils[location.facet, np.where(xi < 0.5, 1, 2)]
+        length = np.minimum(self.chords[at % count, 1], self.chords[(at - 1) % count, 1])
+        near = np.linalg.norm(slaves - self.positions[at], axis=1) <= END_TOLERANCE * length
+        which = np.flatnonzero(near & np.isin(at, self.corners) & np.any(slave_normals, axis=1))
+        if not len(which):
+            return location
+        chord = self.positions[self.stencils[:, 2]] - self.positions[self.stencils[:, 1]]
+        out = np.stack([chord[:, 1], -chord[:, 0]], axis=1) / np.linalg.norm(chord, axis=1, keepdims=True)
+        one, two = out[(at[which] - 1) % count], out[at[which] % count]
+        turn, own = _angle(one, two), _angle(one, -slave_normals[which])
+        angle = np.clip(own, 0.0, np.maximum(turn, 0.0))[:, None]
+        across = np.stack([-one[:, 1], one[:, 0]], axis=1)
+        outward = (turn > 0.0)[:, None]  # into a notch there is no such choice
+        normal = location.normal.copy()
+        normal[which] = np.where(outward, np.cos(angle) * one + np.sin(angle) * across, normal[which])
+        return replace(location, normal=normal, gap=np.sum(normal * (slaves - location.point), axis=1))
+
+
+def _angle(one: Array, other: Array) -> Array:
+    """Signed angles (q,) [rad] from vectors (q, 2) to others."""
+    return np.arctan2(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0], np.sum(one * other, axis=1))
 
 
 def weights_at(segment: IntArray, xi: Array, stencils: IntArray, chords: Array) -> tuple[Array, Array]:

@@ -85,6 +85,8 @@ def pair_surface(
     own = (facing[:, None] * d + np.arange(d)).ravel()
     slave, area, drift = Rows(slave.free[own], slave.lift[own]), area[facing], drift[facing]
     position = slave_position[facing]
+    if isinstance(master, Curve):
+        location = master.at_corners(location, position, slave_normals[facing])
     tolerance = allowed_overlap
     if tolerance is None:
         tolerance = overlap_tolerance(position, slave_normals[facing], master)
