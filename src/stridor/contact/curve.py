@@ -1,5 +1,7 @@
 """The boundary of a plane body as a master: a C1 cubic spline through its nodes, split at corners.
 
+Images of a boundary of a body that repeats may lie apart: then it is several such splines side by side.
+
 The spline is that of `surface`: cubic Hermite, slopes from the neighbours, linear in the node positions. At its ends
 it begins as the parabola through the three nodes there, so that normals are of second order up to the edge of a curved
 master; the line of a beam begins along its chord, as `surface` has it. Since the
@@ -9,6 +11,7 @@ derivative of the gap: dg = n · (du_slave − Σ weights du_master), at any gap
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -44,11 +47,11 @@ class Curve:
     """k nodes in order, the body on the left of their direction, so that the outward normal is on the right.
 
     nodes (k,) are the mesh's own numbers of the curve's nodes, the order in which displacements and rows are
-    expected. positions (k, 2) [m] undisplaced. A closed curve has no ends. Between segments that turn by more than
-    the corner angle, or by far more than at the nodes around (`kinks`), the spline is broken, so that the side of a
-    rectangle and the flat beside a chamfer stay straight; off an outward corner the gap is the distance from it.
-    facets (f, 3): first, last and middle node (−1 for linear facets) of the curve's numbering, as the finite elements
-    interpolate.
+    expected. positions (k, 2) [m] undisplaced. A closed curve has no ends; several side by side have many.
+    Between segments that turn by more than the corner angle, or by far more than at the nodes around (`kinks`), the
+    spline is broken, so that the side of a rectangle and the flat beside a chamfer stay straight; off an outward corner
+    the gap is the distance from it. facets (f, 3): first, last and middle node (−1 for linear facets) of the curve's
+    numbering, as the finite elements interpolate.
     stencils (c, 4): nodes that shape each of the c segments, negative where the spline begins or ends; chords (c, 3):
     undisplaced lengths [m] of the segments before, of and after it. before, after (c,): segments that continue it
     smoothly, −1 at ends and corners. follows_spline: whether displacements are interpolated as positions are, by the
@@ -108,6 +111,31 @@ class Curve:
             chain.nodes, positions, chain.closed, chain.facets, stencils, chords, before, after, follows_spline
         )  # fmt: skip
 
+    @classmethod
+    def side_by_side(cls, parts: Sequence[Curve]) -> Curve:
+        """Curves, one by one as they are, as one of all their nodes; it is closed where a single one is."""
+        if len(parts) == 1:
+            return parts[0]
+        nodes = np.cumsum([0, *(len(part.positions) for part in parts)])
+        segments = np.cumsum([0, *(len(part.chords) for part in parts)])
+
+        def put(name: str, offsets: IntArray) -> IntArray:
+            """The numbers of all parts, negative ones as they are."""
+            given = [getattr(part, name) for part in parts]
+            return np.concatenate([np.where(of < 0, of, of + o) for of, o in zip(given, offsets[:-1], strict=True)])
+
+        return cls(
+            np.concatenate([part.nodes for part in parts]),
+            np.concatenate([part.positions for part in parts]),
+            False,
+            put("facets", nodes),
+            put("stencils", nodes),
+            np.concatenate([part.chords for part in parts]),
+            put("before", segments),
+            put("after", segments),
+            parts[0].follows_spline,
+        )
+
     @property
     def node_count(self) -> int:
         """Number of nodes k."""
@@ -122,7 +150,7 @@ class Curve:
     def corners(self) -> IntArray:
         """Nodes of the curve's own numbering where it turns sharply."""
         broken = self.stencils[self.before < 0, 1]
-        return broken if self.closed else broken[broken > 0]
+        return broken[np.isin(broken, self.stencils[:, 2])]  # others begin a line
 
     @property
     def chord_height(self) -> float:
@@ -192,10 +220,10 @@ class Curve:
 
     def _corner_normals(self, corner: IntArray, offset: Array, current: Array) -> Array:
         """Out of a corner towards (from, inside the body) slaves at an offset (q, 2) from it."""
-        count = len(self.chords)
         chord = current[self.stencils[:, 2]] - current[self.stencils[:, 1]]
         chord /= np.linalg.norm(chord, axis=1, keepdims=True)
-        along = chord[corner % count] + chord[(corner - 1) % count]
+        towards, away = self._segments_at(corner)
+        along = chord[away] + chord[towards]
         mean = np.stack([along[:, 1], -along[:, 0]], axis=1)
         mean /= np.linalg.norm(mean, axis=1, keepdims=True)
         distance = np.linalg.norm(offset, axis=1)
@@ -204,22 +232,28 @@ class Curve:
         scaled = side[:, None] * offset / np.where(apart, distance, 1.0)[:, None]
         return np.where(apart[:, None], scaled, mean)
 
+    def _segments_at(self, node: IntArray) -> tuple[IntArray, IntArray]:
+        """The segments (q,) that end and that begin at nodes (q,) with both."""
+        towards, away = np.zeros((2, len(self.positions)), dtype=np.int64)
+        towards[self.stencils[:, 2]] = away[self.stencils[:, 1]] = np.arange(len(self.chords))
+        return towards[node], away[node]
+
     def at_corners(self, location: Location, slaves: Array, slave_normals: Array) -> Location:
         """Places of undisplaced slaves (m, 2) [m] where those that lie at an outward corner look the way their own
         normals (m, 2) say, as far as the normals of both sides of the corner enclose that.
 
         Which of its sides is nearer there rounding decides. Slaves without a normal keep that side's.
         """
-        count, xi = len(self.chords), np.zeros(len(slaves)) if location.local is None else location.local[:, 0]
+        xi = np.zeros(len(slaves)) if location.local is None else location.local[:, 0]
         at = self.stencils[location.facet, np.where(xi < 0.5, 1, 2)]
-        length = np.minimum(self.chords[at % count, 1], self.chords[(at - 1) % count, 1])
+        length = self.chords[np.stack(self._segments_at(at)), 1].min(axis=0)
         near = np.linalg.norm(slaves - self.positions[at], axis=1) <= END_TOLERANCE * length
         which = np.flatnonzero(near & np.isin(at, self.corners) & np.any(slave_normals, axis=1))
         if not len(which):
             return location
         chord = self.positions[self.stencils[:, 2]] - self.positions[self.stencils[:, 1]]
         out = np.stack([chord[:, 1], -chord[:, 0]], axis=1) / np.linalg.norm(chord, axis=1, keepdims=True)
-        one, two = out[(at[which] - 1) % count], out[at[which] % count]
+        one, two = (out[segment] for segment in self._segments_at(at[which]))
         turn, own = _angle(one, two), _angle(one, -slave_normals[which])
         angle = np.clip(own, 0.0, np.maximum(turn, 0.0))[:, None]
         across = np.stack([-one[:, 1], one[:, 0]], axis=1)

@@ -71,7 +71,7 @@ def _touched(case: Case, view: View, contact: Contact | SurfaceContact) -> IntAr
     """Freedoms of the slave's nodes and of those nodes of the master that they face."""
     table = case.contacts[contact.name]
     slave = _slave_freedoms(case, view, table.slave, f"contacts.{contact.name}.slave")
-    owner, _, boundary = table.master.partition(".")
+    owner = table.master.partition(".")[0]
     if isinstance(case.bodies[owner], ObstacleBody):
         return slave
     body = view.bodies[owner]
@@ -82,7 +82,7 @@ def _touched(case: Case, view: View, contact: Contact | SurfaceContact) -> IntAr
     else:
         where = f"contacts.{contact.name}"
         above = slave_positions(case, view.bodies, table.slave, f"{where}.slave")
-        nodes = master_nodes(case, body, boundary, f"{where}.master", above)[1]
+        nodes = master_nodes(case, view.bodies, table.master, f"{where}.master", above)[1]
         nodes = nodes[np.unique(contact.location.nodes[contact.location.weights != 0.0])]
     return np.concatenate([slave, body.displacements(nodes).ravel()])
 

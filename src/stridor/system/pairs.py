@@ -23,6 +23,7 @@ from ..mesh.model import Blocks
 from ..typing import Array, IntArray
 from .motion import distance_name
 from .repeats import master_nodes, master_rows
+from .sectors import require_same_sectors
 from .view import View, point_position
 
 
@@ -64,6 +65,8 @@ def surface_contact(case: Case, view: View, name: str, contact: ContactCase) -> 
     where = f"contacts.{name}"
     slave_rows, position, area, normals, facets, freedoms = _slave(case, view, where, contact)
     master, master_rows = _master(case, view, where, contact, position)
+    if slave_rows.free.nnz and master_rows.free.nnz:  # what is held all over does not feel how many press on it
+        require_same_sectors(case, view.bodies, name, contact)
     slave_body = case.location(contact.slave).body
     drift = _drift(case, view, slave_body, contact.master.partition(".")[0], position)
     built = pair_surface(
@@ -130,7 +133,7 @@ def _master(
     case: Case, view: View, where: str, contact: ContactCase, slave: Array
 ) -> tuple[MasterSurface, Rows]:
     """The surface that slave positions (m, d) [m] are to lie on, and the rows of its nodes' displacements."""
-    owner, _, boundary = contact.master.partition(".")
+    owner = contact.master.partition(".")[0]
     table = case.bodies[owner]
     if isinstance(table, ObstacleBody):
         empty = Rows(view.pick(np.zeros(0, dtype=np.int64)).free, np.zeros((0, len(view.motion.names))))
@@ -144,7 +147,7 @@ def _master(
         lines = np.stack([np.arange(len(order) - 1), np.arange(1, len(order))], axis=1)
         line = Curve.from_facets(body.points[order], {"line": lines}, where=f"{where}.master", follows_spline=True)
         return line, view.node_rows(body, order)
-    surface, nodes, turns = master_nodes(case, body, boundary, f"{where}.master", slave)
+    surface, nodes, turns = master_nodes(case, view.bodies, contact.master, f"{where}.master", slave)
     return surface, master_rows(view, body, nodes, turns)
 
 

@@ -2,7 +2,9 @@
 
 A boundary ends where the mesh of its sector does, the surface does not. Its images give a master the normals of the
 whole surface up to the cut, and a slave what it lies on, wherever its own sector begins: of a ring those that the slave
-can meet, all of them where these go round. Their nodes move as those that they are images of, turned.
+can meet, all of them where these go round. Their nodes move as those that they are images of, turned. Images of a
+boundary that does not reach both sides of the cut, is on one of several bodies of a sector, or whose meshes do not
+match there are pieces by themselves.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..case import Case
@@ -22,6 +25,7 @@ from ..contact.curve import Curve
 from ..contact.facets import FacetSurface
 from ..contact.interface import Rows
 from ..mesh.boundary import require_boundary
+from ..mesh.facets import chain_of
 from ..mesh.model import Blocks
 from ..typing import Array, IntArray, Sparse
 from .bodies import BuiltBody
@@ -55,10 +59,11 @@ class _Sheet:
 
 
 @dataclass(frozen=True)
-class _Repeat:
-    """How a body repeats: what lies on its nodes ``start`` lies moved on its nodes ``end``, by a way (d,) [m] or by a
-    rotation."""
+class Repeat:
+    """How a body repeats by a tie of a name: what lies on its nodes ``start`` lies moved on its nodes ``end``, by a way
+    (d,) [m] or by a rotation. None of them is on this body where others of the sector reach the cut."""
 
+    name: str
     end: IntArray
     start: IntArray
     way: Array
@@ -72,7 +77,7 @@ class _Repeat:
         turn, centre = turn_of(self.rotation.model_copy(update={"angle_deg": times * self.rotation.angle_deg}), d)
         return (points - centre) @ turn.T + centre, turn
 
-    def together(self, other: _Repeat) -> _Repeat | None:
+    def together(self, other: Repeat) -> Repeat | None:
         """Both as one where they say the same or the opposite of two parts of a side, else None."""
         centre = None if self.rotation is None else self.rotation.centre
         scale = float(np.abs(self.way if centre is None else np.array(centre)).max()) or 1.0
@@ -82,6 +87,11 @@ class _Repeat:
             if np.abs(apart).max() <= ALIKE * scale:
                 return replace(self, end=np.union1d(self.end, end), start=np.union1d(self.start, start))
         return None
+
+    def same_as(self, other: Repeat, points: Array, near: float) -> bool:
+        """Whether another motion, or its inverse, brings points (k, d) [m] to the same places, within ``near`` [m]."""
+        here = self.moved(points, 1)[0]
+        return any(float(np.abs(here - other.moved(points, times)[0]).max()) <= near for times in (1, -1))
 
     def places(self, points: Array, ways: Array) -> Array:
         """Where (k,) points (k, d) are along the repetition, in sectors; NaN on the axis of a turn. ways (t, d): of all
@@ -119,10 +129,12 @@ def slave_positions(case: Case, bodies: dict[str, BuiltBody], reference: str, wh
 
 
 def master_nodes(
-    case: Case, body: BuiltBody, boundary: str, where: str, slave: Array
+    case: Case, bodies: dict[str, BuiltBody], reference: str, where: str, slave: Array
 ) -> tuple[Curve | FacetSurface, IntArray, Array | None]:
     """A boundary as a master that goes on where its body repeats, the mesh nodes (k,) that its nodes are or are images
     of, and by which turns (k, d, d), None without images. slave (m, d) [m]: what is to lie on it."""
+    owner, _, boundary = reference.partition(".")
+    body = bodies[owner]
     mesh = body.mesh
     assert mesh is not None, "checked: boundaries belong to meshes"
     facets = require_boundary(mesh, boundary, where)
@@ -130,14 +142,19 @@ def master_nodes(
     blocks = {kind: np.searchsorted(nodes, block) for kind, block in facets.items() if len(block)}
     single = _Sheet(mesh.points[nodes], blocks, nodes, np.repeat(np.eye(body.dimension)[None], len(nodes), axis=0))
     sheet = single
-    repeats = _repeats(case, body)
+    repeats = repeats_of(case, bodies, body.name)
     ways = np.array([repeat.way for repeat in repeats if repeat.rotation is None])
     for repeat in repeats:
-        sheet = _gone_on(sheet, repeat, ways, slave)
+        sheet = _gone_on(sheet, repeat, ways, slave, _same(single, repeat))
     if sheet is single:
         return *master_surface(mesh, boundary, where), None
-    kind = Curve if body.dimension == 2 else FacetSurface
-    surface = kind.from_facets(sheet.points, sheet.blocks, where=where)
+    surface: Curve | FacetSurface
+    if body.dimension == 2:
+        chain_of(single.points, single.blocks, where=where)  # what is in pieces without images is refused
+        pieces = pieces_of(sheet.blocks)
+        surface = Curve.side_by_side([Curve.from_facets(sheet.points, piece, where=where) for piece in pieces])
+    else:
+        surface = FacetSurface.from_facets(sheet.points, sheet.blocks, where=where)
     return surface, sheet.origin[surface.nodes], sheet.turns[surface.nodes]
 
 
@@ -152,18 +169,23 @@ def master_rows(view: View, body: BuiltBody, nodes: IntArray, turns: Array | Non
     return Rows(free, np.asarray(turned @ rows.lift))
 
 
-def _repeats(case: Case, body: BuiltBody) -> list[_Repeat]:
-    """How a body repeats by ties with itself; several may stand for the parts of one cut."""
-    found: list[_Repeat] = []
-    for name, tie in case.ties.items():
+def repeats_of(case: Case, bodies: dict[str, BuiltBody], name: str) -> list[Repeat]:
+    """How a body repeats: by ties with itself, or between those of the bodies that it is tied to as they lie, which
+    make up its sector together. Several ties may stand for the parts of one cut."""
+    sector = _tied_as_they_lie(case, name)
+    found: list[Repeat] = []
+    for name_of_tie, tie in case.ties.items():
         slave, master = case.location(tie.slave), case.location(tie.master)
-        if (tie.translation is None and tie.rotation is None) or {slave.body, master.body} != {body.name}:
+        if (tie.translation is None and tie.rotation is None) or not {slave.body, master.body} <= sector:
             continue
         assert isinstance(slave, BoundaryRef), "checked"
         assert isinstance(master, BoundaryRef), "checked"
-        end, start = (boundary_nodes(body, at, f"ties.{name}") for at in (slave, master))
-        way = np.zeros(body.dimension) if tie.translation is None else np.array(tie.translation)
-        repeat = _Repeat(end, start, way, tie.rotation)
+        end, start = (
+            boundary_nodes(bodies[name], at, f"ties.{name_of_tie}") if at.body == name else np.zeros(0, dtype=np.int64)
+            for at in (slave, master)
+        )
+        way = np.zeros(bodies[name].dimension) if tie.translation is None else np.array(tie.translation)
+        repeat = Repeat(name_of_tie, end, start, way, tie.rotation)
         for number, other in enumerate(found):
             both = other.together(repeat)
             if both is not None:
@@ -174,28 +196,60 @@ def _repeats(case: Case, body: BuiltBody) -> list[_Repeat]:
     return found
 
 
-def _gone_on(sheet: _Sheet, repeat: _Repeat, ways: Array, slave: Array) -> _Sheet:
-    """The sheet with those of its images that a slave (m, d) [m] can meet; as it is where the meshes of both sides of
-    the cut do not match there."""
-    points, d = sheet.points, sheet.points.shape[1]
-    end, start = (np.flatnonzero(np.isin(sheet.origin, side)) for side in (repeat.end, repeat.start))
-    if len(end) != len(start) or len(end) < d - 1:
+def _tied_as_they_lie(case: Case, name: str) -> set[str]:
+    """A body and those that ties without a motion bond to it, or to those."""
+    pairs = [
+        (case.location(tie.slave).body, case.location(tie.master).body)
+        for tie in case.ties.values()
+        if tie.translation is None and tie.rotation is None
+    ]
+    found, before = {name}, 0
+    while len(found) > before:
+        before = len(found)
+        for pair in pairs:
+            if found.intersection(pair):
+                found.update(pair)
+    return found
+
+
+def pieces_of(blocks: Blocks) -> list[Blocks]:
+    """Facets by kind as those of each connected piece."""
+    edges = np.concatenate([np.stack([block[:, 0], other], axis=1) for block in blocks.values() for other in block.T])
+    size = int(edges.max()) + 1
+    graph = sp.coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(size, size))
+    label = connected_components(graph, directed=False)[1]
+    found: list[Blocks] = []
+    for piece in np.unique(label[edges[:, 0]]):
+        own = {kind: block[label[block[:, 0]] == piece] for kind, block in blocks.items()}
+        found.append({kind: block for kind, block in own.items() if len(block)})
+    return found
+
+
+def _same(sheet: _Sheet, repeat: Repeat) -> float:
+    """Distance [m] within which nodes of both sides of the cut are one."""
+    end = np.isin(sheet.origin, repeat.end)
+    return SAME * float(cKDTree(sheet.points).query(sheet.points[end if end.any() else ...], k=2)[0][:, 1].min())
+
+
+def _gone_on(sheet: _Sheet, repeat: Repeat, ways: Array, slave: Array, same: float) -> _Sheet:
+    """The sheet with those of its images that a slave (m, d) [m] can meet, each a piece by itself where the meshes of
+    both sides of the cut do not match, within ``same`` [m], or do not reach it."""
+    points = sheet.points
+    end, start, matches = _cut(sheet, repeat, same)
+    images, closed = _images(sheet, repeat, ways, slave, same, around_it=matches)
+    if not len(images) or list(images) == [0]:
         return sheet
-    distance, which = cKDTree(points[end]).query(repeat.moved(points[start], 1)[0])
-    same = SAME * cKDTree(points).query(points[end], k=2)[0][:, 1].min()
-    if distance.max() > same or len(np.unique(which)) < len(end):
-        return sheet
-    images, closed = _images(sheet, repeat, ways, slave, same)
     k = len(points)
     number = np.arange(len(images) * k).reshape(-1, k)
     # What two images share is a node of the one that is nearer to the body itself.
     itself = images.index(0) if 0 in images else 0
-    for j in range(itself + 1, len(images)):
-        number[j, start] = number[j - 1, end[which]]
-    for j in range(itself - 1, -1, -1):
-        number[j, end[which]] = number[j + 1, start]
-    if closed:
-        number[-1, end[which]] = number[0, start]
+    if matches:
+        for j in range(itself + 1, len(images)):
+            number[j, start] = number[j - 1, end]
+        for j in range(itself - 1, -1, -1):
+            number[j, end] = number[j + 1, start]
+        if closed:
+            number[-1, end] = number[0, start]
     moved = [repeat.moved(points, times) for times in images]
     return _Sheet(
         np.concatenate([at for at, _ in moved]),
@@ -205,11 +259,24 @@ def _gone_on(sheet: _Sheet, repeat: _Repeat, ways: Array, slave: Array) -> _Shee
     ).used
 
 
-def _images(sheet: _Sheet, repeat: _Repeat, ways: Array, slave: Array, same: float) -> tuple[Sequence[int], bool]:
+def _cut(sheet: _Sheet, repeat: Repeat, same: float) -> tuple[IntArray, IntArray, bool]:
+    """Points (q,) of a sheet at the end and those at the start that lie there once moved; whether all of both do."""
+    d = sheet.points.shape[1]
+    end, start = (np.flatnonzero(np.isin(sheet.origin, side)) for side in (repeat.end, repeat.start))
+    if len(end) != len(start) or len(end) < d - 1:
+        return end, start, False
+    distance, which = cKDTree(sheet.points[end]).query(repeat.moved(sheet.points[start], 1)[0])
+    return end[which], start, bool(distance.max() <= same and len(np.unique(which)) == len(end))
+
+
+def _images(
+    sheet: _Sheet, repeat: Repeat, ways: Array, slave: Array, same: float, *, around_it: bool
+) -> tuple[Sequence[int], bool]:
     """Which images of a sheet, 0 itself, a slave (m, d) [m] can meet, and whether they close to a ring.
 
-    They cover the slave and a sector on both sides of it, two facets at the least: beyond that, nothing of where a
-    surface ends is felt. Those of a turn that is no part of a whole one are never more than one on each side.
+    They cover the slave and, ``around_it``, a sector on both sides of it, two facets at the least: beyond that,
+    nothing of where a surface ends is felt. Those of a turn that is no part of a whole one are never more than one on
+    each side.
     """
     around = math.inf
     if repeat.rotation is not None:
@@ -218,17 +285,10 @@ def _images(sheet: _Sheet, repeat: _Repeat, ways: Array, slave: Array, same: flo
         if around < 1 or float(np.linalg.norm(back, axis=1).max()) > around * same:
             return range(-1, 2), False
     at = repeat.places(sheet.points, ways)
-    own, other = _between(at, around), _between(repeat.places(slave, ways), around)
+    own, other = between(at, around), between(repeat.places(slave, ways), around)
     if own is None or other is None:
         return range(-1, 2), False
-    wide = 0.0
-    for block in sheet.blocks.values():
-        apart = at[block] - at[block][:, :1]
-        if math.isfinite(around):
-            apart -= around * np.round(apart / around)
-        apart = np.nan_to_num(apart)
-        wide = max(wide, float(np.ptp(apart, axis=1).max(initial=0.0)))
-    margin = max(1.0, AROUND * wide)
+    margin = max(1.0, AROUND * widest(at, sheet.blocks, around)) if around_it else 0.0
     first = math.ceil(other[0] - margin - own[1] + TOUCHING)
     last = math.floor(other[1] + margin - own[0] - TOUCHING)
     if last - first + 1 >= around:
@@ -236,7 +296,18 @@ def _images(sheet: _Sheet, repeat: _Repeat, ways: Array, slave: Array, same: flo
     return range(first, last + 1), False
 
 
-def _between(at: Array, around: float) -> tuple[float, float] | None:
+def widest(at: Array, blocks: Blocks, around: float) -> float:
+    """How far the widest facet between nodes at places (k,) reaches, in sectors, of which ``around`` make a turn."""
+    wide = 0.0
+    for block in blocks.values():
+        apart = at[block] - at[block][:, :1]
+        if math.isfinite(around):
+            apart -= around * np.round(apart / around)
+        wide = max(wide, float(np.ptp(np.nan_to_num(apart), axis=1).max(initial=0.0)))
+    return wide
+
+
+def between(at: Array, around: float) -> tuple[float, float] | None:
     """Where places, NaN left out, begin and end; those that come back after ``around`` after their widest gap."""
     known = at[np.isfinite(at)]
     if not len(known):

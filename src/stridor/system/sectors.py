@@ -1,0 +1,222 @@
+"""Whether both sides of a contact are the same part of a whole.
+
+Of a body that repeats one sector stands for all, which do what it does: what touches it touches each of them. So the
+other side repeats alike or is one of as many, and must not reach into its own images by the motion of the first: the
+forces of a whole ring on one sector of a wheel are those of all sectors on one.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..case import Case
+from ..case.points import BoundaryRef
+from ..case.schema import Contact as ContactCase
+from ..contact.curve import Curve
+from ..contact.facets import FacetSurface
+from ..errors import CaseError
+from ..mesh.boundary import require_boundary
+from ..mesh.facets import facet_normals, reference_nodes, shape_functions
+from ..mesh.model import Blocks
+from ..typing import Array, BoolArray
+from .bodies import BuiltBody
+from .repeats import SAME, TOUCHING, Repeat, between, pieces_of, repeats_of, widest
+
+# Of a facet, from its edges inwards: what reaches into another one by less touches it.
+INWARDS = 0.05
+# Of the size of a facet, and the cosine between normals: what is that near, and turned alike, is in one place.
+NEAR, ALONG = 0.5, 0.5
+PARALLEL = 1e-6  # sine between an axis and a way
+
+
+@dataclass(frozen=True)
+class _Side:
+    """A side of a contact: how its body repeats, points (k, d) [m] and facets between them, none of a point."""
+
+    name: str
+    reference: str
+    repeats: list[Repeat]
+    points: Array
+    facets: Blocks
+
+    @property
+    def ways(self) -> Array:
+        """All translations (t, d) [m]."""
+        return np.array([r.way for r in self.repeats if r.rotation is None]).reshape(-1, self.points.shape[1])
+
+
+def require_same_sectors(case: Case, bodies: dict[str, BuiltBody], name: str, contact: ContactCase) -> None:
+    """Raises CaseError where one side of a contact repeats and the other one does so otherwise, or is longer than one
+    sector of the first."""
+    sides = [_side(case, bodies, key, getattr(contact, key)) for key in ("slave", "master")]
+    if any(side is None for side in sides):
+        return
+    slave, master = (side for side in sides if side is not None)
+    for moving, other in ((master, slave), (slave, master)):
+        points = np.concatenate([slave.points, master.points])
+        near = SAME * float(np.median(cKDTree(points).query(points, k=2)[0][:, 1]))
+        lattice = other.ways
+        for repeat in moving.repeats:
+            if any(repeat.same_as(each, points, near) for each in other.repeats) or _within(repeat, lattice, near):
+                continue
+            where = f"contacts.{name}.{other.name}"
+            clashing = next((each for each in other.repeats if _clash(repeat, each, lattice)), None)
+            if clashing is not None:
+                accepted = (
+                    f"repeats by {_motion(clashing)}, the {moving.name} {moving.reference} by {_motion(repeat)}: what "
+                    "touches one sector of the one is no sector of the other. Let both repeat alike, or take both whole"
+                )
+                raise CaseError(where, other.reference, accepted)
+            if other.facets and _meets_itself(repeat, moving.ways, other, near):
+                raise CaseError(where, other.reference, _too_long(repeat, moving, other))
+
+
+def _side(case: Case, bodies: dict[str, BuiltBody], key: str, reference: str) -> _Side | None:
+    """A side of a contact; None for what has no mesh: an obstacle, or the line of a beam."""
+    body = bodies.get(reference.partition(".")[0])
+    if body is None or body.mesh is None:
+        return None
+    repeats = repeats_of(case, bodies, body.name)
+    at = case.location(reference) if "." in reference else None
+    if not isinstance(at, BoundaryRef):
+        return _Side(key, reference, repeats, body.points, {})
+    given = require_boundary(body.mesh, at.boundary, f"contacts.{key}")
+    nodes = np.unique(np.concatenate([block.ravel() for block in given.values()]))
+    facets = {kind: np.searchsorted(nodes, block) for kind, block in given.items() if len(block)}
+    return _Side(key, reference, repeats, body.points[nodes], facets)
+
+
+def _within(repeat: Repeat, lattice: Array, near: float) -> bool:
+    """Whether a translation is a sum of whole ones of a lattice (t, d) [m]."""
+    if repeat.rotation is not None or not len(lattice):
+        return False
+    return _is_sum(repeat.way, lattice, near)
+
+
+def _is_sum(way: Array, lattice: Array, near: float) -> bool:
+    whole = np.round(way @ np.linalg.pinv(lattice))
+    return bool(np.linalg.norm(whole @ lattice - way) <= near)
+
+
+def _clash(one: Repeat, other: Repeat, lattice: Array) -> bool:
+    """Whether two motions that are not the same cannot both leave one whole as it is. lattice (t, d) [m]: all
+    translations of the other one's body."""
+    if one.rotation is None and other.rotation is None:
+        # Along the same line, or within the same plane: steps that differ.
+        off = one.way - one.way @ np.linalg.pinv(lattice) @ lattice
+        return float(np.linalg.norm(off)) <= PARALLEL * float(np.linalg.norm(one.way))
+    if one.rotation is not None and other.rotation is not None:
+        return True  # other axes, or other sectors about one
+    turning, sliding = (one, other) if one.rotation is not None else (other, one)
+    assert turning.rotation is not None
+    axis = np.array(turning.rotation.axis) / np.linalg.norm(turning.rotation.axis)
+    way = np.zeros(3)
+    way[: len(sliding.way)] = sliding.way
+    return float(np.linalg.norm(np.cross(axis, way))) > PARALLEL * float(np.linalg.norm(way))
+
+
+def _meets_itself(repeat: Repeat, ways: Array, side: _Side, near: float) -> bool:
+    """Whether the facets of a side, moved by what another body repeats by, lie in the place of others of its own. ways
+    (t, d) [m]: all translations of that body."""
+    at = repeat.places(side.points, ways)
+    around = round(repeat.around) if math.isfinite(repeat.around) else math.inf
+    reach = between(at, around)
+    if reach is None or (repeat.rotation is not None and reach[1] - reach[0] <= 1.0 + TOUCHING):
+        return False
+    where = ""
+    samples, normals, size = _samples(side.points, side.facets)
+    if side.points.shape[1] == 2:
+        own: Curve | FacetSurface = Curve.side_by_side(
+            [Curve.from_facets(side.points, piece, where=where) for piece in pieces_of(side.facets)]
+        )
+    else:
+        # Each facet by itself: no matter how those of a slave meet.
+        alone = {kind: np.zeros_like(block) for kind, block in side.facets.items()}
+        order = np.concatenate([block.ravel() for block in side.facets.values()])
+        begin = 0
+        for kind, block in side.facets.items():
+            alone[kind] = begin + np.arange(block.size).reshape(block.shape)
+            begin += block.size
+        own = FacetSurface.from_facets(side.points[order], alone, where=where)
+    for moved, turned in _moved(repeat, ways, side, reach, samples, normals, near):
+        found = own.locate(moved)
+        hit: BoolArray = found.inside & (np.abs(found.gap) <= NEAR * size)
+        if bool(np.any(hit & (np.sum(turned * found.normal, axis=1) > ALONG))):
+            return True
+    return False
+
+
+def _moved(
+    repeat: Repeat,
+    ways: Array,
+    side: _Side,
+    reach: tuple[float, float],
+    samples: Array,
+    normals: Array,
+    near: float,
+) -> Iterator[tuple[Array, Array]]:
+    """Samples (q, d) [m] and normals (q, d) moved by every multiple of a turn, or every sum of translations with some
+    of this one, that can bring a side that reaches so far to its own place."""
+    if repeat.rotation is not None:
+        for times in range(1, math.floor(reach[1] - reach[0] + TOUCHING) + 1):
+            moved, turn = repeat.moved(samples, times)
+            yield moved, normals @ turn.T
+        return
+    along = np.ptp(side.points @ np.linalg.pinv(ways), axis=0)
+    most = [range(-math.floor(length + TOUCHING), math.floor(length + TOUCHING) + 1) for length in along.tolist()]
+    this = int(np.argmin(np.abs(ways - repeat.way).max(axis=1)))
+    for steps in itertools.product(*most):
+        way = np.array(steps) @ ways
+        if steps[this] > 0 and not (len(side.ways) and _is_sum(way, side.ways, near)):
+            yield samples + way, normals
+
+
+def _samples(points: Array, facets: Blocks) -> tuple[Array, Array, Array]:
+    """Points (q, d) [m] within facets, as near to all of their nodes as they are not to touch what is beside them, with
+    the normal (q, d) and the size (q,) [m] of the facet."""
+    found: list[tuple[Array, Array, Array]] = []
+    for kind, block in facets.items():
+        nodes = reference_nodes(kind)
+        centre = nodes.mean(axis=0)
+        local = np.concatenate([centre + (1.0 - 2.0 * INWARDS) * (nodes - centre), centre[None]])
+        values = shape_functions(kind, local)[0]
+        at = np.einsum("qr,frd->fqd", values, points[block]).reshape(-1, points.shape[1])
+        size = np.linalg.norm(np.ptp(points[block], axis=1), axis=1)
+        normal = facet_normals(points, block, kind)
+        found.append((at, np.repeat(normal, len(local), axis=0), np.repeat(size, len(local))))
+    at, normals, sizes = (np.concatenate(part) for part in zip(*found, strict=True))
+    return at, normals, sizes
+
+
+def _too_long(repeat: Repeat, moving: _Side, other: _Side) -> str:
+    at = repeat.places(other.points, moving.ways)
+    around = round(repeat.around) if math.isfinite(repeat.around) else math.inf
+    reach = between(at, around)
+    assert reach is not None, "it meets itself"
+    length = reach[1] - reach[0]
+    if around - length <= widest(at, other.facets, around) + TOUCHING:
+        length = around
+    if repeat.rotation is None:
+        step = float(np.linalg.norm(repeat.way))
+        spans, sector = f"{length * step:.6g} m", f"{step:.6g} m"
+    else:
+        step = abs(repeat.rotation.angle_deg)
+        spans, sector = f"{length * step:.6g}°", f"{step:.6g}°"
+    return (
+        f"spans {spans}, a sector of the {moving.name} {moving.reference} {sector} (ties.{repeat.name}): its images "
+        "lie one in the other, and one sector would take the forces of several. Take a "
+        f"{other.name} no longer than a sector, or the same part of both: the {moving.name} whole, "
+        f"without its tie, or the {other.name} as a sector with one"
+    )
+
+
+def _motion(repeat: Repeat) -> str:
+    if repeat.rotation is None:
+        return f"({', '.join(f'{x:.6g}' for x in repeat.way)}) m (ties.{repeat.name})"
+    return f"{repeat.rotation.angle_deg:.6g}° (ties.{repeat.name})"
