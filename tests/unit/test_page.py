@@ -105,7 +105,7 @@ ENDS = {
     "cycles rub.toml --mu 1.0": (
         "1 limit cycle at μ = 1: 1 stable", "simulate rub.toml --stepper exact --mu 1"
     ),
-    "simulate two-beams.toml COARSE": ("last phase: 5970.1 Hz dominates, ", "compare two-beams.toml COARSE"),
+    "simulate two-beams.toml COARSE": ("last phase: 5970.1 Hz is the strongest line, ", "compare two-beams.toml COARSE"),
     "compare two-beams.toml --no-critical COARSE": (
         "agree: μ = 0.1: both unstable at 8651.1 Hz, growth 642.2 against 641.6 1/s (0.1 %)",
         "run two-beams.toml COARSE",

@@ -126,3 +126,37 @@ def test_growth_is_never_called_saturated_however_slow(grown: float, dip: float)
     size = np.exp(grown * time / time[-1]) * (1.0 - dip * np.exp(-(((time - 0.01) / 3e-3) ** 2)))
     fitted = growth(size * np.cos(2 * np.pi * 5e3 * time), 1e-6, 5e3)
     assert not fitted.saturated
+
+
+def limited(rate: float, time: np.ndarray, cycle: np.ndarray | float = 1.0) -> np.ndarray:
+    """Exponential growth from 1e-3 into an amplitude of 1 (times cycle), in a run of many times its rise."""
+    return ((1e3 * np.exp(-rate * time)) ** 4 + (1.0 / cycle) ** 4) ** -0.25
+
+
+@pytest.mark.parametrize("length", [150.0, 300.0, 900.0])
+@pytest.mark.parametrize("wobble", [0.0, 0.25])
+def test_a_fast_rise_at_the_start_of_a_long_run_is_the_growth(length: float, wobble: float) -> None:
+    """20 periods of 0.25 Hz are eleven times as long as it takes to grow by e: over them nothing of it is seen."""
+    time = np.arange(0.0, length, 0.1)
+    size = limited(0.14, time, 1.0 + wobble * np.sin(2 * np.pi * time / 40.0))
+    fitted = growth(size * np.cos(2 * np.pi * 0.25 * time), 0.1, 0.25)
+    assert fitted.exponential
+    assert fitted.saturated
+    assert fitted.rate == pytest.approx(0.14, rel=0.05)
+    assert fitted.end < 50.0
+
+
+def test_what_grows_within_the_shortest_window_is_not_called_exponential() -> None:
+    time = np.arange(0.0, 300.0, 0.1)
+    fitted = growth(limited(0.5, time) * np.cos(2 * np.pi * 0.25 * time), 0.1, 0.25)
+    assert not (fitted.exponential and fitted.rate > 0.02)
+    bent = growth((1e-3 + (time / 300.0) ** 2) * np.cos(2 * np.pi * 2.0 * time), 0.1, 2.0)  # no exponential, and never flat
+    assert not bent.exponential
+
+
+def test_a_decay_among_other_lines_is_fitted_as_before() -> None:
+    time = np.arange(0.0, 400.0, 0.01)
+    signal = np.exp(-0.01 * time) * np.cos(2 * np.pi * 0.25 * time) + 0.3 * np.exp(-0.02 * time) * np.cos(2 * np.pi * 0.4 * time)
+    fitted = growth(signal, 0.01, 0.25)
+    assert fitted.exponential
+    assert fitted.rate == pytest.approx(-0.01, rel=1e-2)

@@ -55,7 +55,7 @@ class RunSummary(Shown):
         sliding; else of the dominant line where it grows exponentially, None where it does not."""
         if self.linear is not None:
             return self.linear.real
-        if self.growth is None or self.growth.spread > EXPONENTIAL:
+        if self.growth is None or not self.growth.exponential or self.growth.spread > EXPONENTIAL:
             return None
         return self.growth.rate
 
