@@ -118,7 +118,22 @@ def test_into_a_notch_a_slave_has_no_choice():
 def test_a_line_that_turns_once_and_a_single_node_between_two_facets():
     assert not len(line([[0, 0], [1, 0], [2, 0.3]]).corners)  # nothing tells an arc of two facets from a kink
     assert line([[0, 0], [1, 0], [2, 0], [3, 0.3], [4, 0.6]]).corners.tolist() == [2]
-    assert line([[0, 0], [1, 0], [2, 0], [3, 0.3]]).corners.tolist() == [2]
+    assert not len(line([[0, 0], [1, 0], [2, 0], [3, 0.3]]).corners)  # nor a curve with an inflection beside its end
+    assert line([[0, 0], [1, 0], [2, 0], [3, 0], [4, 0.3]]).corners.tolist() == [3]
+
+
+def test_curves_with_inflections_and_coarse_fillets_have_no_edges():
+    x = np.linspace(0.0, 2 * np.pi, 17)
+    for waves in (1.0, 1.5, 2.0, 2.5):
+        assert not len(line(np.stack([x, 0.3 * np.sin(waves * x)], axis=1)).corners)
+    rng = np.random.default_rng(5)
+    for _ in range(40):
+        t = np.sort(rng.uniform(0.0, 3.0, 40))
+        t = t[np.diff(t, prepend=-1.0) > 0.02]
+        cubic = np.stack([t, rng.normal() * t + 0.2 * rng.normal() * t**2 + 0.1 * rng.normal() * t**3], axis=1)
+        assert not len(line(cubic).corners)
+    slanted = np.round(np.linspace(0.0, 1.0, 41)[:, None] * [np.cos(0.4), np.sin(0.4)], 5)
+    assert not len(line(slanted).corners)
 
 
 def test_a_flat_slave_touches_all_of_the_flat_of_a_chamfered_master(tmp_path, monkeypatch):

@@ -11,10 +11,13 @@ import numpy as np
 
 from ..typing import Array, BoolArray, IntArray
 
-# Times the larger turn of the two nodes beside: 2 of an arc, and curvature may change from node to node by half.
-RATIO = 3.0
-# rad: coordinates of four digits turn a straight line by less.
-SLIGHT = np.radians(0.1)
+# Times the turns of the nodes beside: those of a chamfer are in line, those beside an inflection or where a fillet
+# begins turn by a third or a fifth. On an arc, whatever the lengths of its segments, it is 2 at most.
+RATIO = 10.0
+# Turns of one curve differ by no more from node to node.
+LIKE = 3.0
+# rad: coordinates of five digits turn a straight line by less.
+SLIGHT = np.radians(0.2)
 # Runs between kinks of a curve that was divided without being rounded differ by no more.
 EVEN = 2.0
 
@@ -28,25 +31,35 @@ def lone_kinks(turn: Array, length: Array, middle: BoolArray, sharp: BoolArray, 
     node of an open line has no turn, and the end of its last segment is none of the nodes.
 
     Three kinks or more that turn by a like amount the same way, at even distances, are a curve whose facets were
-    divided, and no edges. Ends, and edges that turn by far more, say nothing of the curvature beside them.
+    divided, and no edges. Ends, and edges that turn by far more, say nothing of the curvature beside them: there the two
+    nodes on the other side have to be in line.
     """
     size, count = np.abs(turn), len(turn)
-    node = np.arange(count)
-    width = 0.5 * (length + np.roll(length, 1))
-    beside, there = np.zeros((2, count), dtype=np.int64), np.zeros((2, count), dtype=bool)
-    for side, step in enumerate((-1, 1)):
-        other = node + step
-        other += step * (middle[other % count] & ~middle)
-        beside[side] = other % count
-        there[side] = closed | ((other > 0) & (other < count))
-        there[side] &= ~sharp[beside[side]] | (size[beside[side]] <= RATIO * size)
-    turns = np.where(there, size[beside], 0.0)
-    # One neighbour alone tells the curvature, with which the turn of wider segments goes.
-    turns *= np.where(np.all(there, axis=0), 1.0, np.maximum(1.0, width / width[beside]))
-    lone = np.any(there, axis=0) & ~sharp & (size > SLIGHT + RATIO * turns.max(axis=0))
+    beside = [_beside(np.arange(count), step, middle) for step in (-1, 1)]
+    beyond = [_beside(nodes, step, middle) for nodes, step in zip(beside, (-1, 1), strict=True)]
+
+    def straight(nodes: IntArray) -> tuple[BoolArray, BoolArray]:
+        """Whether there are such nodes that say something of the curvature, and that say there is next to none."""
+        there = closed | ((nodes > 0) & (nodes < count))
+        at = nodes % count
+        there &= ~sharp[at] | (size[at] <= LIKE * size)
+        return there, there & (size > SLIGHT + RATIO * size[at])
+
+    (left, no_left), (right, no_right) = (straight(nodes) for nodes in beside)
+    (_, none_behind), (_, none_ahead) = (straight(nodes) for nodes in beyond)
+    # Beside an end, or an edge, a single node in line is one of a curve that turns back there as well.
+    lone = (no_left & no_right) | (~left & no_right & none_ahead) | (~right & no_left & none_behind)
+    lone &= ~sharp
     if not closed:
         lone[0] = False
     return lone & ~_even(np.flatnonzero(lone), turn, length, sharp, closed=closed)
+
+
+def _beside(nodes: IntArray, step: int, middle: BoolArray) -> IntArray:
+    """The nodes (c,) beside others, by a step of one, over middle ones to the next end of a facet; not wrapped round."""
+    count = len(middle)
+    other = nodes + step
+    return other + step * (middle[other % count] & ~middle[nodes % count])
 
 
 def _even(kinks: IntArray, turn: Array, length: Array, sharp: BoolArray, *, closed: bool) -> BoolArray:
@@ -63,7 +76,7 @@ def _even(kinks: IntArray, turn: Array, length: Array, sharp: BoolArray, *, clos
             return -1, 0.0
         other = int(marks[k % len(marks)])
         one, two = float(turn[kink]), float(turn[other])
-        if other == kink or sharp[other] or one * two <= 0 or not 1 / RATIO <= one / two <= RATIO:
+        if other == kink or sharp[other] or one * two <= 0 or not 1 / LIKE <= one / two <= LIKE:
             return -1, 0.0
         return other, step * float(place[other] - place[kink]) % float(place[-1])
 

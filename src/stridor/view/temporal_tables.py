@@ -179,7 +179,8 @@ def agreement_table(comparison: Comparison) -> Table:
         )
     if comparison.run_growth is not None:
         fitted = comparison.run_growth
-        rows.append(TableRow(("growth fitted in the full run [1/s]", "", quantity(fitted.rate, 1), "", fitted.state)))
+        rate = quantity(fitted.rate, 1) if fitted.exponential else "nowhere exponential"
+        rows.append(TableRow(("growth fitted in the full run [1/s]", "", rate, "", fitted.state)))
     if comparison.mac is not None and comparison.responding is not None:
         rows.append(
             TableRow(
