@@ -31,8 +31,8 @@ def lone_kinks(turn: Array, length: Array, middle: BoolArray, sharp: BoolArray, 
     node of an open line has no turn, and the end of its last segment is none of the nodes.
 
     Three kinks or more that turn by a like amount the same way, at even distances, are a curve whose facets were
-    divided, and no edges. Ends, and edges that turn by far more, say nothing of the curvature beside them: there the two
-    nodes on the other side have to be in line.
+    divided, and no edges. Ends, and edges that turn by far more, say nothing of the curvature beside them: there the
+    two nodes on the other side have to be in line.
     """
     size, count = np.abs(turn), len(turn)
     beside = [_beside(np.arange(count), step, middle) for step in (-1, 1)]
@@ -56,7 +56,7 @@ def lone_kinks(turn: Array, length: Array, middle: BoolArray, sharp: BoolArray, 
 
 
 def _beside(nodes: IntArray, step: int, middle: BoolArray) -> IntArray:
-    """The nodes (c,) beside others, by a step of one, over middle ones to the next end of a facet; not wrapped round."""
+    """The nodes (c,) beside others, by a step of one, over middle ones to the next end of a facet; not wrapped."""
     count = len(middle)
     other = nodes + step
     return other + step * (middle[other % count] & ~middle[nodes % count])
