@@ -216,6 +216,20 @@ def test_sides_that_are_not_the_same_part_of_a_whole_are_refused(what: str) -> N
         st.build_system(loads(text))
 
 
+@pytest.mark.parametrize(
+    ("sectors", "angle"), [(7, "51.428571"), (7, "51.4286"), (6, "60.0000001"), (6, "420.0"), (6, "-300.0")]
+)
+def test_one_angle_in_other_digits_is_the_same_on_meshes_that_match(sectors: int, angle: str) -> None:
+    """Nodes of both sides that coincide are at no distance that a tolerance could be taken of."""
+    text = in_the_plane(0.0, sectors=sectors)
+    begin = text.index("[ties.wheel]"), text.index("[bodies.ring]"), text.index("[ties.ring]")
+    text = text[: begin[0]] + turn("wheel", 360.0 / sectors) + text[begin[1] : begin[2]]
+    (surface,) = st.build_system(loads(text + turn("ring").replace("60.0", angle))).surfaces
+    assert surface.area.sum() == pytest.approx(4 * 0.06 * 0.01 * np.sin(np.pi / sectors / 2), rel=1e-9)
+    with pytest.raises(CaseError, match=r"repeats by .*° \(ties\.ring\)"):
+        st.build_system(loads(text + turn("ring", 360.0 / sectors + 0.2)))
+
+
 def blocks(high: str, more: str = "") -> str:
     """A block of ``high`` keys on one that repeats each 30 mm along x."""
     low = 'shape = "block", corner = [0.0, 0.0, 0.0], size = [0.03, 0.02, 0.01], divisions = [3, 2, 1], cells = "hexahedron"'
@@ -239,6 +253,8 @@ def test_blocks_that_are_longer_than_a_step_are_refused() -> None:
         st.build_system(loads(blocks(high(0.04, 4))))
     with pytest.raises(CaseError, match=r"repeats by \(0\.06, 0, 0\) m \(ties\.high\), the master low\.top by \(0\.03, "):
         st.build_system(loads(blocks(high(0.06, 6), step("high", 0.06))))
+    for same in (0.030000000000000006, 0.03000001):
+        st.build_system(loads(blocks(high(0.03, 3).replace("0.01, 0.0, 0.01", "0.0, 0.0, 0.01", 1), step("high", same))))
     for accepted in (blocks(high(0.03, 3)), blocks(high(0.03, 3), step("high", 0.03)), blocks(high(0.02, 2))):
         st.build_system(loads(accepted))
 

@@ -88,10 +88,12 @@ class Repeat:
                 return replace(self, end=np.union1d(self.end, end), start=np.union1d(self.start, start))
         return None
 
-    def same_as(self, other: Repeat, points: Array, near: float) -> bool:
-        """Whether another motion, or its inverse, brings points (k, d) [m] to the same places, within ``near`` [m]."""
+    def same_as(self, other: Repeat, points: Array, near: Array) -> bool:
+        """Whether another motion, or its inverse, brings points (k, d) [m] to the same places, within ``near`` (k,)
+        [m]."""
         here = self.moved(points, 1)[0]
-        return any(float(np.abs(here - other.moved(points, times)[0]).max()) <= near for times in (1, -1))
+        apart = [np.abs(here - other.moved(points, times)[0]).max(axis=1) for times in (1, -1)]
+        return any(bool(np.all(each <= near)) for each in apart)
 
     def places(self, points: Array, ways: Array) -> Array:
         """Where (k,) points (k, d) are along the repetition, in sectors; NaN on the axis of a turn. ways (t, d): of all
