@@ -288,3 +288,18 @@ def test_a_master_that_is_held_does_not_feel_how_many_press_on_it() -> None:
     held = held.replace("sliding = { spin = 10.0 }", "")
     (surface,) = st.build_system(loads(held)).surfaces
     assert len(surface.area) == 36
+
+
+@pytest.mark.parametrize("slave", ["ring.inner", "wheel.outer"])
+def test_a_held_ring_round_a_sector_that_moves_is_its_master(slave: str) -> None:
+    """As a slave it would press with all of its nodes on the one sector that moves."""
+    outer = '[supports.all]\nat = "ring.inner"\nfixed = ["x", "y"]\n' + ring(0.0, 360.0)
+    if slave == "ring.inner":
+        with pytest.raises(CaseError, match=r"contacts\.face\.slave: .*spans 360°, a sector of the master wheel\.outer"):
+            st.build_system(loads(wheel_in(outer, slave)))
+        return
+    whole = in_the_plane(0.0, slave=slave, around=6, whole=True)
+    every = whole[: whole.index("[bodies.ring]")] + outer
+    sector = wheel_in(outer, slave).replace("divisions = [1, 2]", "divisions = [1, 6]")
+    one, six = (float(st.steady_sliding(loads(text)).normal_force.sum()) for text in (sector, every))
+    assert 6.0 * one == pytest.approx(six, rel=1e-9)
