@@ -303,3 +303,67 @@ def test_a_held_ring_round_a_sector_that_moves_is_its_master(slave: str) -> None
     sector = wheel_in(outer, slave).replace("divisions = [1, 2]", "divisions = [1, 6]")
     one, six = (float(st.steady_sliding(loads(text)).normal_force.sum()) for text in (sector, every))
     assert 6.0 * one == pytest.approx(six, rel=1e-9)
+
+
+def pad_below(start: float, slave: str = "wheel.outer") -> str:
+    """One pad of 40° to a sector of a wheel from 0° to 60°, which repeats; the pad does not."""
+    return wheel_in(ring(start, 40.0), slave).replace("divisions = [1, 2]", "divisions = [1, 6]")
+
+
+def test_a_pad_as_the_master_reaches_over_the_cut_of_its_slave() -> None:
+    """From 40° to 80°, from −20° to 20°, in the fourth sector: as within the first one, and as the slave."""
+    expected = what_comes_out(pad_below(10.0))
+    for start in (40.0, -20.0, 220.0):
+        assert what_comes_out(pad_below(start)) == pytest.approx(expected, rel=1e-8, abs=1e-14)
+    master, slave = (st.steady_sliding(loads(pad_below(40.0, which))) for which in ("wheel.outer", "ring.inner"))
+    assert master.resultants["face"].area == pytest.approx(slave.resultants["face"].area, rel=1e-12)
+    assert master.normal_force.sum() == pytest.approx(slave.normal_force.sum(), rel=1e-4)
+
+
+def test_a_pad_in_space_as_the_master_reaches_over_the_cut_of_its_slave() -> None:
+    """A pad of 40° under each 60° of a disc: wherever it begins, and with all of its area."""
+    area = 4 * 0.5 * np.sin(np.radians(10.0)) * (0.08**2 - 0.05**2)
+    found = []
+    for start in (10.0, 40.0, -200.0):
+        text = in_space(start).replace(turn("ring"), "")
+        text = text.replace('slave = "ring.bottom"', 'slave = "disc.top"').replace('master = "disc.top"', 'master = "ring.bottom"')
+        pad = f"start_deg = {start}, sweep_deg = 60.0, thickness = 0.01, divisions = [1, 3, 1]"
+        assert pad in text
+        text = text.replace(pad, pad.replace("60.0", "40.0").replace("3", "4")).replace("[1, 3, 1]", "[1, 6, 1]")
+        text = text.replace("0.05, outer_radius = 0.08", "@").replace("0.04, outer_radius = 0.09", "0.05, outer_radius = 0.08")
+        found.append(what_comes_out(text.replace("@", "0.04, outer_radius = 0.09")))
+        assert found[-1][3] == pytest.approx(area, rel=1e-9)
+    for other in found[1:]:
+        assert other[:-6] == pytest.approx(found[0][:-6], rel=1e-8, abs=1e-13)
+        assert other[-6:-1] == pytest.approx(found[0][-6:-1], rel=1e-6)  # as above
+
+
+def test_blocks_as_masters_reach_over_a_step_of_their_slave() -> None:
+    """20 of 30 mm, wherever they lie: forces and pressures do not change, and sum to the load."""
+    found = []
+    for begin in (0.0, 0.02, -0.07):
+        text = blocks(high(0.03, 6).replace("0.01, 0.0, 0.01", "0.0, 0.0, 0.01"), step("high", 0.03)).replace(step("low", 0.03), "")
+        text = text.replace("corner = [0.0, 0.0, 0.0], size = [0.03,", f"corner = [{begin}, 0.0, 0.0], size = [0.02,").replace(
+            "divisions = [3, 2, 1]", "divisions = [2, 2, 1]", 1
+        )
+        case = loads(text)
+        steady = st.steady_sliding(case)
+        assert steady.normal_force.sum() == pytest.approx(1e6 * 0.03 * 0.02, rel=1e-9)
+        (resultant,) = steady.resultants.values()
+        assert resultant.area == pytest.approx(0.02 * 0.02, rel=1e-9)
+        found.append(np.sort(steady.normal_force))
+    for other in found[1:]:
+        assert other == pytest.approx(found[0], rel=1e-8)
+
+
+def test_a_master_whose_images_slide_otherwise_is_refused() -> None:
+    """A pad that slides along x beside one of its images that slides along a turned x: one law would not say."""
+    for start, refused in ((10.0, False), (40.0, True)):
+        text = pad_below(start)
+        at = text.index("[supports.ring]")
+        text = text[:at] + "sliding = { velocity = [0.3, 0.0] }\n" + text[at:]
+        if refused:
+            with pytest.raises(CaseError, match=r"contacts\.face\.master: .*reaches over the cut .*\(ties\.wheel\)"):
+                st.build_system(loads(text))
+        else:
+            st.build_system(loads(text))

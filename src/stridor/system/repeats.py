@@ -4,7 +4,8 @@ A boundary ends where the mesh of its sector does, the surface does not. Its ima
 whole surface up to the cut, and a slave what it lies on, wherever its own sector begins: of a ring those that the slave
 can meet, all of them where these go round. Their nodes move as those that they are images of, turned. Images of a
 boundary that does not reach both sides of the cut, is on one of several bodies of a sector, or whose meshes do not
-match there are pieces by themselves.
+match there are pieces by themselves. So are those of a master that does not repeat under a slave that does: one pad to
+each sector reaches over the slave's cut.
 """
 
 from __future__ import annotations
@@ -131,10 +132,11 @@ def slave_positions(case: Case, bodies: dict[str, BuiltBody], reference: str, wh
 
 
 def master_nodes(
-    case: Case, bodies: dict[str, BuiltBody], reference: str, where: str, slave: Array
+    case: Case, bodies: dict[str, BuiltBody], reference: str, where: str, slave: Array, lent: Sequence[Repeat] = ()
 ) -> tuple[Curve | FacetSurface, IntArray, Array | None]:
     """A boundary as a master that goes on where its body repeats, the mesh nodes (k,) that its nodes are or are images
-    of, and by which turns (k, d, d), None without images. slave (m, d) [m]: what is to lie on it."""
+    of, and by which turns (k, d, d), None without images. slave (m, d) [m]: what is to lie on it; lent: motions of
+    its body that the master's does not repeat by, whose images are pieces."""
     owner, _, boundary = reference.partition(".")
     body = bodies[owner]
     mesh = body.mesh
@@ -144,7 +146,7 @@ def master_nodes(
     blocks = {kind: np.searchsorted(nodes, block) for kind, block in facets.items() if len(block)}
     single = _Sheet(mesh.points[nodes], blocks, nodes, np.repeat(np.eye(body.dimension)[None], len(nodes), axis=0))
     sheet = single
-    repeats = repeats_of(case, bodies, body.name)
+    repeats = [*repeats_of(case, bodies, body.name), *lent]
     ways = np.array([repeat.way for repeat in repeats if repeat.rotation is None])
     for repeat in repeats:
         sheet = _gone_on(sheet, repeat, ways, slave, _same(single, repeat))

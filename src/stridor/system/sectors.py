@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -72,6 +72,25 @@ def require_same_sectors(case: Case, bodies: dict[str, BuiltBody], name: str, co
                 raise CaseError(where, other.reference, accepted)
             if other.facets and _meets_itself(repeat, moving.ways, other, near):
                 raise CaseError(where, other.reference, _too_long(repeat, moving, other))
+
+
+def lent_repeats(case: Case, bodies: dict[str, BuiltBody], contact: ContactCase) -> list[Repeat]:
+    """Motions by which the slave of a contact repeats and its master does not, which is one of as many then: the slave
+    meets the others of them beyond its own cut. None by which the master reaches into itself, as a whole ring does."""
+    slave = _side(case, bodies, "slave", contact.slave)
+    if slave is None or not slave.repeats:
+        return []
+    master = _side(case, bodies, "master", contact.master)
+    if master is None:
+        return []
+    near, nowhere = _near(slave, master), np.zeros(0, dtype=np.int64)
+    return [
+        replace(repeat, end=nowhere, start=nowhere)
+        for repeat in slave.repeats
+        if not _repeats_by(repeat, master, slave, master)
+        and not any(_clash(repeat, each, master.ways) for each in master.repeats)
+        and not _meets_itself(repeat, slave.ways, master, near)
+    ]
 
 
 def _side(case: Case, bodies: dict[str, BuiltBody], key: str, reference: str) -> _Side | None:
