@@ -367,3 +367,17 @@ def test_a_master_whose_images_slide_otherwise_is_refused() -> None:
                 st.build_system(loads(text))
         else:
             st.build_system(loads(text))
+
+
+@pytest.mark.parametrize("slave", ["wheel.outer", "ring.inner"])
+def test_gaps_between_pads_that_are_narrower_than_a_facet_carry_nothing(slave: str) -> None:
+    """8 of 60°, under facets of 10°: also where both nodes of one are above pads."""
+    for start in (3.0, 10.0, 41.5):
+        text = wheel_in(part("ring", (0.06, 0.08), start, 52.0, 6, "outer"), slave).replace("divisions = [1, 2]", "divisions = [1, 6]")
+        (surface,) = st.build_system(loads(text)).surfaces
+        assert surface.area.sum() == pytest.approx(0.06 * 0.01 * np.radians(52.0), rel=2e-3)  # of chords
+    text = blocks(high(0.03, 3).replace("0.01, 0.0, 0.01", "0.0, 0.0, 0.01"), step("high", 0.03)).replace(step("low", 0.03), "")
+    for begin, length in ((0.02, 0.02), (0.016, 0.023)):
+        low = text.replace("corner = [0.0, 0.0, 0.0], size = [0.03,", f"corner = [{begin}, 0.0, 0.0], size = [{length},")
+        (surface,) = st.build_system(loads(low)).surfaces
+        assert surface.area.sum() == pytest.approx(length * 0.02, rel=1e-9)
