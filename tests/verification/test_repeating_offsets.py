@@ -176,8 +176,14 @@ def test_a_repeating_slave_that_slides_is_described() -> None:
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_sectors_that_meet_at_an_edge_only_do_not_face_each_other(dimension: int) -> None:
-    text = in_space(60.0, disc_repeats=False)
-    if dimension == 2:
-        text = in_the_plane(60.0).replace(TIE.replace("NAME", "wheel").replace("ANGLE", "60"), "")
+    """Unless the slave repeats: the next sector of the master is below it then."""
+    text = in_space(60.0, disc_repeats=False) if dimension == 3 else in_the_plane(60.0)
+    text = text.replace(TIE.replace("NAME", "wheel").replace("ANGLE", "60"), "")
+    ring = TIE.replace("NAME", "ring").replace("ANGLE", "60.0" if dimension == 3 else "60")
+    assert ring in text
+    (surface,), (first,) = (
+        st.build_system(loads(each)).surfaces for each in (text, text.replace("start_deg = 60.0", "start_deg = 0.0"))
+    )
+    assert surface.area.sum() == pytest.approx(first.area.sum(), rel=1e-9)
     with pytest.raises(CaseError, match="do not face each other: they only meet at an edge of the master, at "):
-        st.build_system(loads(text))
+        st.build_system(loads(text.replace(ring, "")))

@@ -216,6 +216,20 @@ def test_sides_that_are_not_the_same_part_of_a_whole_are_refused(what: str) -> N
         st.build_system(loads(text))
 
 
+@pytest.mark.parametrize(
+    ("sectors", "angle"), [(7, "51.428571"), (7, "51.4286"), (6, "60.0000001"), (6, "420.0"), (6, "-300.0")]
+)
+def test_one_angle_in_other_digits_is_the_same_on_meshes_that_match(sectors: int, angle: str) -> None:
+    """Nodes of both sides that coincide are at no distance that a tolerance could be taken of."""
+    text = in_the_plane(0.0, sectors=sectors)
+    begin = text.index("[ties.wheel]"), text.index("[bodies.ring]"), text.index("[ties.ring]")
+    text = text[: begin[0]] + turn("wheel", 360.0 / sectors) + text[begin[1] : begin[2]]
+    (surface,) = st.build_system(loads(text + turn("ring").replace("60.0", angle))).surfaces
+    assert surface.area.sum() == pytest.approx(4 * 0.06 * 0.01 * np.sin(np.pi / sectors / 2), rel=1e-9)
+    with pytest.raises(CaseError, match=r"repeats by .*° \(ties\.ring\)"):
+        st.build_system(loads(text + turn("ring", 360.0 / sectors + 0.2)))
+
+
 def blocks(high: str, more: str = "") -> str:
     """A block of ``high`` keys on one that repeats each 30 mm along x."""
     low = 'shape = "block", corner = [0.0, 0.0, 0.0], size = [0.03, 0.02, 0.01], divisions = [3, 2, 1], cells = "hexahedron"'
@@ -239,6 +253,8 @@ def test_blocks_that_are_longer_than_a_step_are_refused() -> None:
         st.build_system(loads(blocks(high(0.04, 4))))
     with pytest.raises(CaseError, match=r"repeats by \(0\.06, 0, 0\) m \(ties\.high\), the master low\.top by \(0\.03, "):
         st.build_system(loads(blocks(high(0.06, 6), step("high", 0.06))))
+    for same in (0.030000000000000006, 0.03000001):
+        st.build_system(loads(blocks(high(0.03, 3).replace("0.01, 0.0, 0.01", "0.0, 0.0, 0.01", 1), step("high", same))))
     for accepted in (blocks(high(0.03, 3)), blocks(high(0.03, 3), step("high", 0.03)), blocks(high(0.02, 2))):
         st.build_system(loads(accepted))
 
@@ -272,3 +288,96 @@ def test_a_master_that_is_held_does_not_feel_how_many_press_on_it() -> None:
     held = held.replace("sliding = { spin = 10.0 }", "")
     (surface,) = st.build_system(loads(held)).surfaces
     assert len(surface.area) == 36
+
+
+@pytest.mark.parametrize("slave", ["ring.inner", "wheel.outer"])
+def test_a_held_ring_round_a_sector_that_moves_is_its_master(slave: str) -> None:
+    """As a slave it would press with all of its nodes on the one sector that moves."""
+    outer = '[supports.all]\nat = "ring.inner"\nfixed = ["x", "y"]\n' + ring(0.0, 360.0)
+    if slave == "ring.inner":
+        with pytest.raises(CaseError, match=r"contacts\.face\.slave: .*spans 360°, a sector of the master wheel\.outer"):
+            st.build_system(loads(wheel_in(outer, slave)))
+        return
+    whole = in_the_plane(0.0, slave=slave, around=6, whole=True)
+    every = whole[: whole.index("[bodies.ring]")] + outer
+    sector = wheel_in(outer, slave).replace("divisions = [1, 2]", "divisions = [1, 6]")
+    one, six = (float(st.steady_sliding(loads(text)).normal_force.sum()) for text in (sector, every))
+    assert 6.0 * one == pytest.approx(six, rel=1e-9)
+
+
+def pad_below(start: float, slave: str = "wheel.outer") -> str:
+    """One pad of 40° to a sector of a wheel from 0° to 60°, which repeats; the pad does not."""
+    return wheel_in(ring(start, 40.0), slave).replace("divisions = [1, 2]", "divisions = [1, 6]")
+
+
+def test_a_pad_as_the_master_reaches_over_the_cut_of_its_slave() -> None:
+    """From 40° to 80°, from −20° to 20°, in the fourth sector: as within the first one, and as the slave."""
+    expected = what_comes_out(pad_below(10.0))
+    for start in (40.0, -20.0, 220.0):
+        assert what_comes_out(pad_below(start)) == pytest.approx(expected, rel=1e-8, abs=1e-14)
+    master, slave = (st.steady_sliding(loads(pad_below(40.0, which))) for which in ("wheel.outer", "ring.inner"))
+    assert master.resultants["face"].area == pytest.approx(slave.resultants["face"].area, rel=1e-12)
+    assert master.normal_force.sum() == pytest.approx(slave.normal_force.sum(), rel=1e-4)
+
+
+def test_a_pad_in_space_as_the_master_reaches_over_the_cut_of_its_slave() -> None:
+    """A pad of 40° under each 60° of a disc: wherever it begins, and with all of its area."""
+    area = 4 * 0.5 * np.sin(np.radians(10.0)) * (0.08**2 - 0.05**2)
+    found = []
+    for start in (10.0, 40.0, -200.0):
+        text = in_space(start).replace(turn("ring"), "")
+        text = text.replace('slave = "ring.bottom"', 'slave = "disc.top"').replace('master = "disc.top"', 'master = "ring.bottom"')
+        pad = f"start_deg = {start}, sweep_deg = 60.0, thickness = 0.01, divisions = [1, 3, 1]"
+        assert pad in text
+        text = text.replace(pad, pad.replace("60.0", "40.0").replace("3", "4")).replace("[1, 3, 1]", "[1, 6, 1]")
+        text = text.replace("0.05, outer_radius = 0.08", "@").replace("0.04, outer_radius = 0.09", "0.05, outer_radius = 0.08")
+        found.append(what_comes_out(text.replace("@", "0.04, outer_radius = 0.09")))
+        assert found[-1][3] == pytest.approx(area, rel=1e-9)
+    for other in found[1:]:
+        assert other[:-6] == pytest.approx(found[0][:-6], rel=1e-8, abs=1e-13)
+        assert other[-6:-1] == pytest.approx(found[0][-6:-1], rel=1e-6)  # as above
+
+
+def test_blocks_as_masters_reach_over_a_step_of_their_slave() -> None:
+    """20 of 30 mm, wherever they lie: forces and pressures do not change, and sum to the load."""
+    found = []
+    for begin in (0.0, 0.02, -0.07):
+        text = blocks(high(0.03, 6).replace("0.01, 0.0, 0.01", "0.0, 0.0, 0.01"), step("high", 0.03)).replace(step("low", 0.03), "")
+        text = text.replace("corner = [0.0, 0.0, 0.0], size = [0.03,", f"corner = [{begin}, 0.0, 0.0], size = [0.02,").replace(
+            "divisions = [3, 2, 1]", "divisions = [2, 2, 1]", 1
+        )
+        case = loads(text)
+        steady = st.steady_sliding(case)
+        assert steady.normal_force.sum() == pytest.approx(1e6 * 0.03 * 0.02, rel=1e-9)
+        (resultant,) = steady.resultants.values()
+        assert resultant.area == pytest.approx(0.02 * 0.02, rel=1e-9)
+        found.append(np.sort(steady.normal_force))
+    for other in found[1:]:
+        assert other == pytest.approx(found[0], rel=1e-8)
+
+
+def test_a_master_whose_images_slide_otherwise_is_refused() -> None:
+    """A pad that slides along x beside one of its images that slides along a turned x: one law would not say."""
+    for start, refused in ((10.0, False), (40.0, True)):
+        text = pad_below(start)
+        at = text.index("[supports.ring]")
+        text = text[:at] + "sliding = { velocity = [0.3, 0.0] }\n" + text[at:]
+        if refused:
+            with pytest.raises(CaseError, match=r"contacts\.face\.master: .*reaches over the cut .*\(ties\.wheel\)"):
+                st.build_system(loads(text))
+        else:
+            st.build_system(loads(text))
+
+
+@pytest.mark.parametrize("slave", ["wheel.outer", "ring.inner"])
+def test_gaps_between_pads_that_are_narrower_than_a_facet_carry_nothing(slave: str) -> None:
+    """8 of 60°, under facets of 10°: also where both nodes of one are above pads."""
+    for start in (3.0, 10.0, 41.5):
+        text = wheel_in(part("ring", (0.06, 0.08), start, 52.0, 6, "outer"), slave).replace("divisions = [1, 2]", "divisions = [1, 6]")
+        (surface,) = st.build_system(loads(text)).surfaces
+        assert surface.area.sum() == pytest.approx(0.06 * 0.01 * np.radians(52.0), rel=2e-3)  # of chords
+    text = blocks(high(0.03, 3).replace("0.01, 0.0, 0.01", "0.0, 0.0, 0.01"), step("high", 0.03)).replace(step("low", 0.03), "")
+    for begin, length in ((0.02, 0.02), (0.016, 0.023)):
+        low = text.replace("corner = [0.0, 0.0, 0.0], size = [0.03,", f"corner = [{begin}, 0.0, 0.0], size = [{length},")
+        (surface,) = st.build_system(loads(low)).surfaces
+        assert surface.area.sum() == pytest.approx(length * 0.02, rel=1e-9)

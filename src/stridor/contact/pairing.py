@@ -21,7 +21,7 @@ from .interface import Rows
 from .joined import joined
 from .master import Location, MasterSurface
 from .pieces import OPPOSED
-from .rim import Hanging, hanging
+from .rim import Hanging, hanging, over_gaps
 from .surfaces import SurfaceContact, operators
 from .ties import Bond
 
@@ -187,12 +187,16 @@ def _over_edges(
     reach: float | None,
 ) -> Hanging | None:
     """Facets that hang over an edge of the master, of which nodes facing (q,) lie at a location above it."""
-    if len(facing) == len(position) or not isinstance(master, Curve | FacetSurface):
+    if not isinstance(master, Curve | FacetSurface):
+        return None
+    everywhere = location if len(facing) == len(position) else master.locate(position)
+    between = over_gaps(facets, position, facing, master, everywhere)
+    if len(facing) == len(position) and not any(each.any() for each in between.values()):
         return None
     masks = _which_oppose(facets, position, facing, location)
     if not any(keep.any() for keep in masks.values()):
         return None
-    return hanging(facets, masks, position, normals, facing, master, master.locate(position), reach)
+    return hanging(facets, masks, position, normals, facing, master, everywhere, reach, between)
 
 
 def repair(

@@ -1,14 +1,15 @@
 """Slave facets that hang over an edge of the master: only what lies above the master is in contact.
 
 A node of such a facet stands for A_i = ∫ φ_i dA over the covered part, also a node beyond the edge, and its dual
-function ψ_i is biorthogonal there (Cichosz and Bischoff, Comput. Methods Appl. Mech. Eng. 200, 2011, 1317; Popp,
-Seitz, Gee and Wall, ibid. 264, 2013, 67). So areas sum to the intersection of both surfaces, an even pressure gives
-both bodies their consistent forces, and the master's weights, ∫ ψ_i φ_l dA / A_i, continue its surface to nodes beyond
-the edge: forces and moments balance. Quadratic facets are taken as linear ones between their own nodes, whose functions
-are positive on every part. A node beyond the edge that stands for less than a twentieth of what it would if all of its
-facets were covered takes no part, and its share goes to the others of each facet: a rigid contact would press there
-with a force that does not go to zero with the area. The gap of a node beyond the edge is that to the tangent plane of
-the edge, less what the slave bends away from there on, as if the master bent with it.
+function ψ_i is biorthogonal there (Cichosz and Bischoff, Comput. Methods Appl. Mech. Eng. 200, 2011, 1317; Popp, Seitz,
+Gee and Wall, ibid. 264, 2013, 67). So areas sum to the intersection of both surfaces, an even pressure gives both
+bodies their consistent forces, and the master's weights, ∫ ψ_i φ_l dA / A_i, continue its surface to nodes beyond the
+edge: forces and moments balance. Quadratic facets are taken as linear ones between their own nodes, whose functions are
+positive on every part. So are facets with all nodes above the master that reach over a gap between its pieces. A node
+beyond the edge that stands for less than a twentieth of what it would if all of its facets were covered takes no part,
+and its share goes to the others of each facet: a rigid contact would press there with a force that does not go to zero
+with the area. The gap of a node beyond the edge is that to the tangent plane of the edge, less what the slave bends
+away from there on, as if the master bent with it.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..mesh.facets import facet_integrals, facet_normals, shape_functions
@@ -27,7 +29,7 @@ from .curve import Curve
 from .facets import SPLITS, FacetSurface
 from .interpolation import element_weights
 from .master import Location
-from .pieces import OPPOSED, Points, covered, outlines
+from .pieces import MOST_COVER, OPPOSED, Points, covered, outlines
 
 # A part of a facet of which less lies over the master is rounding.
 LEAST = 1e-12
@@ -131,12 +133,13 @@ def hanging(
     master: Curve | FacetSurface,
     location: Location,
     reach: float | None,
+    between: Mapping[str, BoolArray],
 ) -> Hanging | None:
     """What hangs over an edge of facets between b nodes at position (b, d) [m] with outward unit normals (b, d), found
     at a location (b,); None for nothing.
 
     facing (q,): the nodes right above the master; kept: which facets (f,) of each kind are in contact as far as these
-    tell.
+    tell; between: which reach over what is between its pieces (`over_gaps`).
     """
     over = np.zeros(len(position), dtype=bool)
     over[facing] = True
@@ -150,6 +153,7 @@ def hanging(
     for kind, given in facets.items():
         block = np.asarray(given)
         crossing = beyond[block].any(axis=1) & (over | beyond)[block].all(axis=1)
+        crossing |= between[kind]
         chosen = np.flatnonzero(crossing)
         chosen = chosen[_near(position, location, block[chosen])]
         found = np.zeros(len(block), dtype=bool)
@@ -176,6 +180,41 @@ def hanging(
     thin[np.concatenate([facing[:0], *(block.ravel() for block in together.values())])] = True
     thin &= ~over & (held < THIN * whole)
     return Hanging(blocks, masks, together, thin, bend, replace(location, gap=location.gap - bend))
+
+
+def over_gaps(
+    facets: Blocks, position: Array, facing: IntArray, master: Curve | FacetSurface, location: Location
+) -> dict[str, BoolArray]:
+    """Which facets (f,) of each kind lie over what is between pieces of the master, with all of their nodes, those
+    facing (q,) of b at position (b, d) [m] and a location (b,), above some of these."""
+    over = np.zeros(len(position), dtype=bool)
+    over[facing] = True
+    piece = _piece_below(master, location)
+    found: dict[str, BoolArray] = {}
+    for kind, given in facets.items():
+        block = np.asarray(given)
+        gap = np.zeros(len(block), dtype=bool)
+        below = piece[block]
+        chosen = np.flatnonzero(over[block].all(axis=1) & (below.max(axis=1) > below.min(axis=1)))
+        share, whole = np.zeros(len(chosen)), np.zeros(len(chosen))
+        for columns in _split(kind):
+            linear, part = LINEAR_OF[len(columns)], block[chosen][:, columns]
+            share += _covered_shares(linear, position, part, master, location).sum(axis=1)
+            whole += facet_integrals(position, part, linear).sum(axis=1)
+        gap[chosen] = share < (2.0 - MOST_COVER) * whole
+        found[kind] = gap
+    return found
+
+
+def _piece_below(master: Curve | FacetSurface, location: Location) -> IntArray:
+    """Numbers (b,) of the connected pieces of a master that places (b,) are on."""
+    first = np.repeat(master.facets[:, :1], master.facets.shape[1] - 1, axis=1).ravel()
+    other = master.facets[:, 1:].ravel()
+    first, other = first[other >= 0], other[other >= 0]
+    graph = sp.coo_array((np.ones(len(first)), (first, other)), shape=(master.node_count, master.node_count))
+    label = np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+    nearest = np.argmax(np.abs(location.weights), axis=1)
+    return label[location.nodes[np.arange(len(nearest)), nearest]]
 
 
 def _split(kind: str) -> list[list[int]]:

@@ -14,6 +14,7 @@ from ..contact.surfaces import SurfaceContact
 from ..errors import CaseError
 from ..typing import Array, IntArray
 from .repeats import master_nodes, slave_positions
+from .sectors import lent_repeats
 from .supports import boundary_nodes
 from .view import View, nearest_node
 
@@ -82,7 +83,8 @@ def _touched(case: Case, view: View, contact: Contact | SurfaceContact) -> IntAr
     else:
         where = f"contacts.{contact.name}"
         above = slave_positions(case, view.bodies, table.slave, f"{where}.slave")
-        nodes = master_nodes(case, view.bodies, table.master, f"{where}.master", above)[1]
+        lent = lent_repeats(case, view.bodies, table)
+        nodes = master_nodes(case, view.bodies, table.master, f"{where}.master", above, lent)[1]
         nodes = nodes[np.unique(contact.location.nodes[contact.location.weights != 0.0])]
     return np.concatenate([slave, body.displacements(nodes).ravel()])
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,8 +23,8 @@ from ..mesh.facets import nodal_areas, nodal_normals
 from ..mesh.model import Blocks
 from ..typing import Array, IntArray
 from .motion import distance_name
-from .repeats import master_nodes, master_rows
-from .sectors import require_same_sectors
+from .repeats import ALIKE, Repeat, master_nodes, master_rows
+from .sectors import lent_repeats, require_same_sectors
 from .view import View, point_position
 
 
@@ -65,7 +66,7 @@ def surface_contact(case: Case, view: View, name: str, contact: ContactCase) -> 
     where = f"contacts.{name}"
     slave_rows, position, area, normals, facets, freedoms = _slave(case, view, where, contact)
     master, master_rows = _master(case, view, where, contact, position)
-    if slave_rows.free.nnz and master_rows.free.nnz:  # what is held all over does not feel how many press on it
+    if master_rows.free.nnz:  # one that is held all over does not feel how many press on it
         require_same_sectors(case, view.bodies, name, contact)
     slave_body = case.location(contact.slave).body
     drift = _drift(case, view, slave_body, contact.master.partition(".")[0], position)
@@ -147,8 +148,28 @@ def _master(
         lines = np.stack([np.arange(len(order) - 1), np.arange(1, len(order))], axis=1)
         line = Curve.from_facets(body.points[order], {"line": lines}, where=f"{where}.master", follows_spline=True)
         return line, view.node_rows(body, order)
-    surface, nodes, turns = master_nodes(case, view.bodies, contact.master, f"{where}.master", slave)
+    lent = lent_repeats(case, view.bodies, contact)
+    surface, nodes, turns = master_nodes(case, view.bodies, contact.master, f"{where}.master", slave, lent)
+    sliding: SlidingTable | None = getattr(table, "sliding", None)
+    if turns is not None and sliding is not None:
+        _require_images_that_slide(where, contact, sliding, lent, body.points[nodes])
     return surface, master_rows(view, body, nodes, turns)
+
+
+def _require_images_that_slide(
+    where: str, contact: ContactCase, sliding: SlidingTable, lent: Sequence[Repeat], points: Array
+) -> None:
+    """Raises CaseError for a master whose images slide otherwise than its velocity says of their places. points (k, d)
+    [m]: of the master."""
+    own = material_velocity(sliding, points)
+    for repeat in lent:
+        moved, turn = repeat.moved(points, 1)
+        if float(np.abs(material_velocity(sliding, moved) - own @ turn.T).max()) > ALIKE * float(np.abs(own).max()):
+            accepted = (
+                f"reaches over the cut of the slave {contact.slave}, which repeats (ties.{repeat.name}), and slides "
+                f"otherwise than its images there. Take {contact.master} as the slave and {contact.slave} as the master"
+            )
+            raise CaseError(f"{where}.master", contact.master, accepted)
 
 
 def _obstacle(table: ObstacleBody) -> MasterSurface:

@@ -4,7 +4,8 @@ A boundary ends where the mesh of its sector does, the surface does not. Its ima
 whole surface up to the cut, and a slave what it lies on, wherever its own sector begins: of a ring those that the slave
 can meet, all of them where these go round. Their nodes move as those that they are images of, turned. Images of a
 boundary that does not reach both sides of the cut, is on one of several bodies of a sector, or whose meshes do not
-match there are pieces by themselves.
+match there are pieces by themselves. So are those of a master that does not repeat under a slave that does: one pad to
+each sector reaches over the slave's cut.
 """
 
 from __future__ import annotations
@@ -88,10 +89,12 @@ class Repeat:
                 return replace(self, end=np.union1d(self.end, end), start=np.union1d(self.start, start))
         return None
 
-    def same_as(self, other: Repeat, points: Array, near: float) -> bool:
-        """Whether another motion, or its inverse, brings points (k, d) [m] to the same places, within ``near`` [m]."""
+    def same_as(self, other: Repeat, points: Array, near: Array) -> bool:
+        """Whether another motion, or its inverse, brings points (k, d) [m] to the same places, within ``near`` (k,)
+        [m]."""
         here = self.moved(points, 1)[0]
-        return any(float(np.abs(here - other.moved(points, times)[0]).max()) <= near for times in (1, -1))
+        apart = [np.abs(here - other.moved(points, times)[0]).max(axis=1) for times in (1, -1)]
+        return any(bool(np.all(each <= near)) for each in apart)
 
     def places(self, points: Array, ways: Array) -> Array:
         """Where (k,) points (k, d) are along the repetition, in sectors; NaN on the axis of a turn. ways (t, d): of all
@@ -129,10 +132,11 @@ def slave_positions(case: Case, bodies: dict[str, BuiltBody], reference: str, wh
 
 
 def master_nodes(
-    case: Case, bodies: dict[str, BuiltBody], reference: str, where: str, slave: Array
+    case: Case, bodies: dict[str, BuiltBody], reference: str, where: str, slave: Array, lent: Sequence[Repeat] = ()
 ) -> tuple[Curve | FacetSurface, IntArray, Array | None]:
     """A boundary as a master that goes on where its body repeats, the mesh nodes (k,) that its nodes are or are images
-    of, and by which turns (k, d, d), None without images. slave (m, d) [m]: what is to lie on it."""
+    of, and by which turns (k, d, d), None without images. slave (m, d) [m]: what is to lie on it; lent: motions of
+    its body that the master's does not repeat by, whose images are pieces."""
     owner, _, boundary = reference.partition(".")
     body = bodies[owner]
     mesh = body.mesh
@@ -142,7 +146,7 @@ def master_nodes(
     blocks = {kind: np.searchsorted(nodes, block) for kind, block in facets.items() if len(block)}
     single = _Sheet(mesh.points[nodes], blocks, nodes, np.repeat(np.eye(body.dimension)[None], len(nodes), axis=0))
     sheet = single
-    repeats = repeats_of(case, bodies, body.name)
+    repeats = [*repeats_of(case, bodies, body.name), *lent]
     ways = np.array([repeat.way for repeat in repeats if repeat.rotation is None])
     for repeat in repeats:
         sheet = _gone_on(sheet, repeat, ways, slave, _same(single, repeat))

@@ -10,10 +10,9 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..case import Case
 from ..case.points import BoundaryRef
@@ -59,11 +58,9 @@ def require_same_sectors(case: Case, bodies: dict[str, BuiltBody], name: str, co
         return
     slave, master = (side for side in sides if side is not None)
     for moving, other in ((master, slave), (slave, master)):
-        points = np.concatenate([slave.points, master.points])
-        near = SAME * float(np.median(cKDTree(points).query(points, k=2)[0][:, 1]))
-        lattice = other.ways
+        lattice, near = other.ways, _near(slave, master)
         for repeat in moving.repeats:
-            if any(repeat.same_as(each, points, near) for each in other.repeats) or _within(repeat, lattice, near):
+            if _repeats_by(repeat, other, slave, master):
                 continue
             where = f"contacts.{name}.{other.name}"
             clashing = next((each for each in other.repeats if _clash(repeat, each, lattice)), None)
@@ -75,6 +72,25 @@ def require_same_sectors(case: Case, bodies: dict[str, BuiltBody], name: str, co
                 raise CaseError(where, other.reference, accepted)
             if other.facets and _meets_itself(repeat, moving.ways, other, near):
                 raise CaseError(where, other.reference, _too_long(repeat, moving, other))
+
+
+def lent_repeats(case: Case, bodies: dict[str, BuiltBody], contact: ContactCase) -> list[Repeat]:
+    """Motions by which the slave of a contact repeats and its master does not, which is one of as many then: the slave
+    meets the others of them beyond its own cut. None by which the master reaches into itself, as a whole ring does."""
+    slave = _side(case, bodies, "slave", contact.slave)
+    if slave is None or not slave.repeats:
+        return []
+    master = _side(case, bodies, "master", contact.master)
+    if master is None:
+        return []
+    near, nowhere = _near(slave, master), np.zeros(0, dtype=np.int64)
+    return [
+        replace(repeat, end=nowhere, start=nowhere)
+        for repeat in slave.repeats
+        if not _repeats_by(repeat, master, slave, master)
+        and not any(_clash(repeat, each, master.ways) for each in master.repeats)
+        and not _meets_itself(repeat, slave.ways, master, near)
+    ]
 
 
 def _side(case: Case, bodies: dict[str, BuiltBody], key: str, reference: str) -> _Side | None:
@@ -90,6 +106,30 @@ def _side(case: Case, bodies: dict[str, BuiltBody], key: str, reference: str) ->
     nodes = np.unique(np.concatenate([block.ravel() for block in given.values()]))
     facets = {kind: np.searchsorted(nodes, block) for kind, block in given.items() if len(block)}
     return _Side(key, reference, repeats, body.points[nodes], facets)
+
+
+def _near(slave: _Side, master: _Side) -> float:
+    """Distance [m] within which places are one. Of facets, not of distances between nodes: where meshes match these
+    lie on each other."""
+    return SAME * min(_smallest(side.points, side.facets)[1] for side in (slave, master) if side.facets)
+
+
+def _smallest(points: Array, facets: Blocks) -> tuple[Array, float]:
+    """Size (k,) [m] of the smallest facet at each point, NaN where there is none, and of the smallest one of all."""
+    found = np.full(len(points), np.inf)
+    for block in facets.values():
+        size = np.linalg.norm(np.ptp(points[block], axis=1), axis=1)
+        np.minimum.at(found, block, size[:, None])
+    return np.where(np.isfinite(found), found, np.nan), float(found.min())
+
+
+def _repeats_by(repeat: Repeat, other: _Side, slave: _Side, master: _Side) -> bool:
+    """Whether a side repeats by a motion of the other one too, as far as facets of either can tell."""
+    near = _near(slave, master)
+    points = np.concatenate([slave.points, master.points])
+    size = np.concatenate([_smallest(side.points, side.facets)[0] for side in (slave, master)])
+    alike = np.where(np.isnan(size), near, SAME * size)
+    return any(repeat.same_as(each, points, alike) for each in other.repeats) or _within(repeat, other.ways, near)
 
 
 def _within(repeat: Repeat, lattice: Array, near: float) -> bool:
@@ -218,5 +258,5 @@ def _too_long(repeat: Repeat, moving: _Side, other: _Side) -> str:
 
 def _motion(repeat: Repeat) -> str:
     if repeat.rotation is None:
-        return f"({', '.join(f'{x:.6g}' for x in repeat.way)}) m (ties.{repeat.name})"
-    return f"{repeat.rotation.angle_deg:.6g}° (ties.{repeat.name})"
+        return f"({', '.join(f'{x:.10g}' for x in repeat.way)}) m (ties.{repeat.name})"
+    return f"{repeat.rotation.angle_deg:.10g}° (ties.{repeat.name})"
