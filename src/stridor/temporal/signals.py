@@ -278,8 +278,12 @@ class _Amplitude:
             if saturated:
                 part, exponential = self._exponential(0.5 * plateau)
         else:
-            part = slice(int(np.argmax(size[: max(3, len(size) // 2)])), len(size))
+            early = size[: max(3, len(size) // 2)]
+            part = slice(int(np.argmax(early)), len(size))
             exponential = _alike(time[part], level[part])
+            if not exponential:  # it may have stayed as high for a while
+                part = slice(int(np.flatnonzero(early >= (1.0 - CONSTANT) * early.max())[-1]), len(size))
+                exponential = _alike(time[part], level[part])
         t, y = time[part], level[part]
         if len(t) < 3:
             t, y = time, level
