@@ -99,8 +99,10 @@ def gone() -> None:
     """From here on a signal changes nothing, as nothing is left but to take the interpreter down.
 
     It gives signals back to the system on its way, which would end the process by the signal and not with the exit code
-    that it has earned.
+    that it has earned. So does Python 3.8 and later at its end where the last text that it has run as code, as for a
+    data class amid an import, was left by a KeyboardInterrupt, whoever caught that: what is run here is left by none.
     """
+    exec("")
     if _program.installed:
         for number in STOPPING:
             if signal.getsignal(number) is _handle:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -96,3 +97,15 @@ except KeyboardInterrupt:
     interrupts.heard()
     print("interrupted")
 """
+
+
+def test_an_interrupt_amid_what_python_makes_of_text_is_no_death_by_a_signal(tmp_path: Path) -> None:
+    """Data classes are made of text: where Ctrl-C falls into one, `python -m` ended by the signal, though it was told."""
+    (tmp_path / "program.py").write_text(
+        "import sys\nfrom stridor import interrupts\ninterrupts.install()\n"
+        "try:\n    exec('raise KeyboardInterrupt')\nexcept KeyboardInterrupt:\n    interrupts.heard()\n"
+        "interrupts.leave()\ninterrupts.gone()\nsys.exit(interrupts.INTERRUPTED)\n",
+        encoding="utf-8",
+    )
+    done = subprocess.run([sys.executable, "-m", "program"], cwd=tmp_path, capture_output=True, check=False, timeout=60)
+    assert (done.returncode, done.stderr) == (130, b"")
