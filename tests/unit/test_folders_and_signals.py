@@ -197,6 +197,15 @@ def test_what_is_stronger_than_the_dominant_line_and_slower_than_the_window_reso
     assert ("Hz dominates" in sentence) is not told
 
 
+@pytest.mark.parametrize("saturated", [True, False])
+def test_a_run_without_exponential_growth_is_said_to_have_saturated_where_it_has(saturated: bool) -> None:
+    from stridor.app.conclusions import of_run
+
+    summary = {"dominant_frequency_hz": 100.0, "stronger_below_hz": None, "growth_rate": None, "growth_fit": None}
+    said = of_run({**summary, "saturated": saturated}).sentence
+    assert said == f"last phase: 100.0 Hz dominates, nowhere exponential growth, {'' if saturated else 'not '}saturated"
+
+
 def test_dollars_in_names_begin_no_formula(tmp_path: Path) -> None:
     """What is written is shown, on figures as in tables."""
 

@@ -170,7 +170,7 @@ def of_run(summary: dict[str, Any], *, slides: bool = True) -> Conclusion:
         )
         return Conclusion(said, "modes" if slides else "")
     rate, fit = summary["growth_rate"], summary["growth_fit"]
-    state, growth = "not saturated", "nowhere exponential growth"
+    state, growth = "saturated" if summary["saturated"] else "not saturated", "nowhere exponential growth"
     if rate is not None:
         state = state_of(rate, fit["end"] - fit["start"], saturated=bool(summary["saturated"]))
         growth = f"growth {measured(rate, 1)} 1/s where exponential"
