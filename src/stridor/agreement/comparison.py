@@ -401,7 +401,15 @@ def dominant_response(run: Trajectory, max_frequency_hz: float) -> tuple[float |
     given where it could be fitted over less than LEAST_PERIODS of that line.
     """
     signal = _response(run)
-    return (None, None) if signal is None else dominant_line(signal, run.sampling, max_frequency_hz)
+    if signal is None:
+        return None, None
+    filtered = low_passed(signal, run.sampling, max_frequency_hz)
+    frequency, amplitude = spectrum_of_end(filtered, run.sampling, 0.5).line()
+    if amplitude == 0.0:
+        return None, None
+    fitted = growth(filtered, run.sampling, frequency)
+    # A rate from part of a period is the start of the motion, not its growth.
+    return frequency, fitted if (fitted.end - fitted.start) * frequency >= LEAST_PERIODS else None
 
 
 def _response(run: Trajectory) -> Array | None:
@@ -422,24 +430,11 @@ def stronger_below(run: Trajectory, max_frequency_hz: float) -> float | None:
     signal = _response(run)
     if signal is None:
         return None
-    spec = _spectrum_of_end(low_passed(signal, run.sampling, max_frequency_hz), run.sampling, 0.5)
+    spec = spectrum_of_end(low_passed(signal, run.sampling, max_frequency_hz), run.sampling, 0.5)
     (below, slow), (_, amplitude) = spec.slower(), spec.line()
     return below if 0.0 < amplitude < slow else None
 
 
-def _spectrum_of_end(filtered: Array, sampling: float, share: float) -> Spectrum:
+def spectrum_of_end(filtered: Array, sampling: float, share: float) -> Spectrum:
+    """Spectrum of the last share of a signal (k,) sampled every ``sampling`` [s] that has been low-passed."""
     return spectrum(filtered[int(len(filtered) * (1.0 - share)) :], sampling)
-
-
-def dominant_line(
-    signal: Array, sampling: float, max_frequency_hz: float, share: float = 0.5
-) -> tuple[float | None, Growth | None]:
-    """Frequency [Hz] of the largest line in the last share of a signal (k,) sampled every ``sampling`` [s], and the
-    growth of that line over all of it, as `dominant_response` has them; None for what there is not."""
-    filtered = low_passed(signal, sampling, max_frequency_hz)
-    frequency, amplitude = _spectrum_of_end(filtered, sampling, share).line()
-    if amplitude == 0.0:
-        return None, None
-    fitted = growth(filtered, sampling, frequency)
-    # A rate from part of a period is the start of the motion, not its growth.
-    return frequency, fitted if (fitted.end - fitted.start) * frequency >= LEAST_PERIODS else None

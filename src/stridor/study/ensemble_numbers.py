@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..agreement.comparison import dominant_line
+from ..agreement.comparison import spectrum_of_end
 from ..errors import CaseError
 from ..system import System
 from ..temporal.settings import Settings
+from ..temporal.signals import low_passed
 from ..temporal.trajectory import ContactStatistics, PhaseResult, Trajectory
 from ..typing import Array
 
@@ -109,8 +110,9 @@ def numbers_of(run: Trajectory, observable: Observable, max_frequency_hz: float)
     loudest = int(np.argmax(np.ptp(seen, axis=0)))
     start = run.phase_slice(-2).start if len(run.phases) > 1 else window.start
     share = len(seen) / (window.stop - start)
-    frequency = dominant_line(signals[start : window.stop, loudest], run.sampling, max_frequency_hz, share)[0]
-    return MemberNumbers(rms, peak, math.nan if frequency is None else frequency, rate, regime, contacts)
+    filtered = low_passed(signals[start : window.stop, loudest], run.sampling, max_frequency_hz)
+    frequency, amplitude = spectrum_of_end(filtered, run.sampling, share).line()
+    return MemberNumbers(rms, peak, frequency if amplitude > 0.0 else math.nan, rate, regime, contacts)
 
 
 def _one_state(contact: ContactStatistics) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import TypeVar
 
 import numpy as np
@@ -217,15 +218,20 @@ def growth(signal: Array, sampling: float, frequency_hz: float) -> Growth:
     """
     if frequency_hz <= 0 or len(signal) < 32:
         return Growth(0.0, 0.0, len(signal) * sampling, 0.0, False, 0.0)
-    over = [_Amplitude.of(signal, sampling, frequency_hz, periods) for periods in PERIODS]
-    fits = [amplitude.growth() for amplitude in over]
-    alone = fits[-1].amplitude < BESIDE * fits[0].amplitude
-    for amplitude, fit in zip(over, fits, strict=True):
+
+    def over(periods: float) -> _Amplitude:
+        return _Amplitude.of(signal, sampling, frequency_hz, periods)
+
+    narrow, wide = over(PERIODS[0]), over(PERIODS[-1])
+    found, fewest = narrow.growth(), wide.growth()
+    alone = fewest.amplitude < BESIDE * found.amplitude
+    for amplitude in chain([narrow], map(over, PERIODS[1:-1]), [wide]):  # most need no more than the first
+        fit = amplitude.growth()
         # What does not rise over many periods may have risen within them.
-        hidden = alone and not amplitude.rises and over[-1].rises_before(fit.start)
-        if fit.exponential and not hidden and (not alone or over[-1].bears_out(fit)):
+        hidden = alone and not amplitude.rises and wide.rises_before(fit.start)
+        if fit.exponential and not hidden and (not alone or wide.bears_out(fit)):
             return fit
-    return replace(fits[0], exponential=False, saturated=(fits[-1] if alone else fits[0]).saturated)
+    return replace(found, exponential=False, saturated=(fewest if alone else found).saturated)
 
 
 @dataclass(frozen=True)
