@@ -100,7 +100,7 @@ def compute(case: list[str], moves: int, levers: list[str]) -> None:
     from stridor.app.page.bench import bench
     from stridor.app.page.levers import friction_range
     from stridor.app.page.levers import levers as levers_of
-    from stridor.app.page.state import State, checked, first_state
+    from stridor.app.page.state import PageState, checked, first_state
     from stridor.app.page.worker import IDLE
 
     def send(part: str, _: object) -> None:
@@ -109,7 +109,7 @@ def compute(case: list[str], moves: int, levers: list[str]) -> None:
 
     answer = bench()
 
-    def asked(state: State) -> float:
+    def asked(state: PageState) -> float:
         began = time.process_time()
         with suppress(Enough):
             answer(state, send)

@@ -16,7 +16,7 @@ from matrix_cases import matrix_case
 from stridor.app.page.bench import Bench
 from stridor.app.page.drawing import drawing
 from stridor.app.page.mesh_marks import held_nodes, pushes, slides
-from stridor.app.page.state import Source, State, first_state
+from stridor.app.page.state import PageState, Source, first_state
 from stridor.case import Case, template_text
 from stridor.study.workspace import Workspace
 from stridor.system import System, build_system
@@ -24,7 +24,7 @@ from stridor.system import System, build_system
 BEAMS = Source.template("two-beams")
 
 
-def answered(bench: Bench, state: State) -> dict[str, Any]:
+def answered(bench: Bench, state: PageState) -> dict[str, Any]:
     """The newest content of every part, as the browser has it: through JSON."""
     found: dict[str, Any] = {}
     bench(state, lambda part, content: found.__setitem__(part, json.loads(json.dumps(content, allow_nan=False))))
@@ -37,22 +37,22 @@ def bench() -> Bench:
 
 
 @pytest.fixture(scope="module")
-def state() -> State:
+def state() -> PageState:
     return replace(first_state(BEAMS).with_change("bodies.beam1.angle_deg", 83.0), mu=0.3)
 
 
 @pytest.fixture(scope="module")
-def unstable(state: State) -> Any:
+def unstable(state: PageState) -> Any:
     modes = st.modes(state.case(), mu=0.3, max_frequency_hz=40e3, vectors="right")
     return modes, int(modes.branch[np.argmax(modes.growth_rate[0])])
 
 
 @pytest.fixture(scope="module")
-def found(bench: Bench, state: State, unstable: Any) -> dict[str, Any]:
+def found(bench: Bench, state: PageState, unstable: Any) -> dict[str, Any]:
     return answered(bench, replace(state, branch=unstable[1]))
 
 
-def test_onsets_are_those_of_the_package_to_all_digits(found: dict[str, Any], state: State):
+def test_onsets_are_those_of_the_package_to_all_digits(found: dict[str, Any], state: PageState):
     wanted = st.onsets(state.case())
     assert found["onsets"]["onsets"] == [json.loads(json.dumps(o.to_json())) for o in wanted]
     assert found["onsets"]["complete"] is wanted.complete is True
@@ -67,7 +67,7 @@ def test_modes_at_the_friction_of_the_page_are_checked_ones(found: dict[str, Any
     assert "Checked" in found["at"]["completeness"]
 
 
-def test_branches_over_friction_are_those_of_a_sweep(found: dict[str, Any], state: State):
+def test_branches_over_friction_are_those_of_a_sweep(found: dict[str, Any], state: PageState):
     modes = st.modes(state.case(), found["locus"]["mu"], max_frequency_hz=40e3, check=False)
     assert 0.3 in found["locus"]["mu"]
     for column, branch in enumerate(found["locus"]["branches"]):
@@ -86,7 +86,7 @@ def test_the_energy_of_a_mode_is_balanced(found: dict[str, Any], unstable: Any):
     assert shape["contacts"]["each"][0]["per_cycle"] > 0 > shape["contacts"]["damping"]
 
 
-def test_the_tornado_is_that_of_sensitivities(found: dict[str, Any], state: State, unstable: Any):
+def test_the_tornado_is_that_of_sensitivities(found: dict[str, Any], state: PageState, unstable: Any):
     _, branch = unstable
     wanted = st.sensitivities(state.case(), ["mu", "materials.steel.density"], mu=0.3, modes=[branch], max_frequency_hz=40e3)
     bars = {bar["path"]: bar for bar in found["tornado"]["bars"]}
@@ -96,7 +96,7 @@ def test_the_tornado_is_that_of_sensitivities(found: dict[str, Any], state: Stat
     assert sizes == sorted(sizes, reverse=True)
 
 
-def test_the_geometry_is_sent_once(bench: Bench, state: State, unstable: Any, found: dict[str, Any]):
+def test_the_geometry_is_sent_once(bench: Bench, state: PageState, unstable: Any, found: dict[str, Any]):
     assert "geometry" in found["shape"]
     again = answered(bench, replace(state, mu=0.31, branch=unstable[1]))
     assert "geometry" not in again["shape"]

@@ -19,7 +19,7 @@ from stridor.app.page.bench import Bench
 from stridor.app.page.mode_data import tornado_at
 from stridor.app.page.model_reduced import Reduced
 from stridor.app.page.runs import ENDS, Queue, Run, Wish
-from stridor.app.page.state import Source, State, first_state
+from stridor.app.page.state import PageState, Source, first_state
 from stridor.case import template_text
 from stridor.modal.parametric import ReducedModes, restricted
 from stridor.study.workspace import Workspace
@@ -30,10 +30,10 @@ STIFF = "contacts.A.stiffness"
 
 
 @pytest.fixture(scope="module")
-def answered() -> Callable[[State], list[tuple[str, Any]]]:
+def answered() -> Callable[[PageState], list[tuple[str, Any]]]:
     bench = Bench()
 
-    def answer(state: State) -> list[tuple[str, Any]]:
+    def answer(state: PageState) -> list[tuple[str, Any]]:
         found: list[tuple[str, Any]] = []
         bench(state, lambda part, content: found.append((part, json.loads(json.dumps(content, allow_nan=False)))))
         return found
@@ -41,7 +41,7 @@ def answered() -> Callable[[State], list[tuple[str, Any]]]:
     return answer
 
 
-def test_what_it_answers_is_the_full_model_and_it_says_how_near(answered: Callable[[State], list[tuple[str, Any]]]):
+def test_what_it_answers_is_the_full_model_and_it_says_how_near(answered: Callable[[PageState], list[tuple[str, Any]]]):
     first = answered(STATE)
     case = STATE.case()
     assert st.build_system(case).size > bench_module.LARGE
@@ -64,7 +64,7 @@ def test_what_it_answers_is_the_full_model_and_it_says_how_near(answered: Callab
     assert all(o["residual"] < 1e-9 for o in onsets["onsets"])  # solved in the full problem
 
 
-def test_it_is_made_once_and_the_stiffness_moves_on_it(answered: Callable[[State], list[tuple[str, Any]]]):
+def test_it_is_made_once_and_the_stiffness_moves_on_it(answered: Callable[[PageState], list[tuple[str, Any]]]):
     answered(STATE)
     moved = STATE.with_change(STIFF, 3e9)
     again = answered(replace(moved, mu=0.25))
@@ -106,7 +106,7 @@ def _without_last(modes: ReducedModes) -> ReducedModes:
     return replace(modes, values=modes.values[:-1], right=modes.right[:, :-1], left=modes.left[:, :-1])
 
 
-def test_a_mode_of_it_moves_all_of_the_model(answered: Callable[[State], list[tuple[str, Any]]]):
+def test_a_mode_of_it_moves_all_of_the_model(answered: Callable[[PageState], list[tuple[str, Any]]]):
     found = answered(replace(STATE, branch=8))
     shapes = [content for part, content in found if part == "shape"]
     assert shapes[0]["contacts"]["why"] == "being computed"
@@ -116,7 +116,7 @@ def test_a_mode_of_it_moves_all_of_the_model(answered: Callable[[State], list[tu
     assert fed == pytest.approx(2 * shape["growth_rate"] / shape["frequency_hz"], rel=1e-3)
 
 
-def test_curves_come_coarse_first_and_then_whole(answered: Callable[[State], list[tuple[str, Any]]]):
+def test_curves_come_coarse_first_and_then_whole(answered: Callable[[PageState], list[tuple[str, Any]]]):
     answered(STATE)
     drawn = [content for part, content in answered(STATE.with_change(STIFF, 7e9)) if part == "locus"]
     few, all_ = (len(content["mu"]) for content in drawn)
@@ -140,7 +140,7 @@ def test_the_first_curves_are_quick_and_say_how_near_they_are():
 
 
 def test_sensitivities_are_those_of_the_full_model_once_they_are_asked_for(
-    answered: Callable[[State], list[tuple[str, Any]]], tmp_path: Path
+    answered: Callable[[PageState], list[tuple[str, Any]]], tmp_path: Path
 ):
     state = replace(STATE, branch=8)
     found = answered(state)

@@ -16,8 +16,8 @@ from stridor.app.page.levers import levers
 from stridor.app.page.state import (
     LARGEST_LINK,
     History,
+    PageState,
     Source,
-    State,
     checked,
     file_text,
     first_state,
@@ -77,7 +77,7 @@ def test_undo_and_redo_walk_along_the_states():
 
 @pytest.mark.parametrize("source", [BEAMS, Source("mine.toml", template_text("two-beams") + "\n# mine\n")])
 def test_a_link_restores_the_state(source: Source):
-    state = State(source, {"bodies.beam1.angle_deg": 80.25}, 0.31, 7, "map")
+    state = PageState(source, {"bodies.beam1.angle_deg": 80.25}, 0.31, 7, "map")
     link = to_link(state, OWN)
     assert from_link(link, OWN) == state
     assert len(link) < (400 if source is BEAMS else LARGEST_LINK)
@@ -158,7 +158,7 @@ def test_the_levers_of_the_two_beams():
 def test_every_lever_moves_its_case():
     case = checked(BEAMS)
     for lever in levers(case):
-        moved = State(BEAMS, {lever.path: lever.value + 0.01 * (lever.high - lever.low)}).case()
+        moved = PageState(BEAMS, {lever.path: lever.value + 0.01 * (lever.high - lever.low)}).case()
         assert moved != case, lever.path
 
 

@@ -58,7 +58,7 @@ class Curve:
         found = np.array([1.0, slope]) / np.hypot(1.0, slope)
         return found * np.sign(found @ along)
 
-    def settled(self, point: Place, heading: np.ndarray, /) -> tuple[Place, np.ndarray]:
+    def next_start(self, point: Place, heading: np.ndarray, /) -> tuple[Place, np.ndarray]:
         return point, heading
 
     def at(self, mu: float, one: Place, other: Place) -> Place:

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 import stridor as st
 from stridor.app.cli import app
 from stridor.errors import AnalysisError, CaseError
-from stridor.temporal.attractor import _peaks, settled, spread
+from stridor.temporal.attractor import _peaks, settled_contacts, spread
 from stridor.temporal.trajectory import ContactStatistics, PhaseResult, Trajectory
 from stridor.view.temporal_tables import contact_table, settled_table
 
@@ -49,7 +49,7 @@ def pulses(peaks, factor=1.0):
 
 def test_averages_of_known_pulses_begin_with_the_first_separation():
     peaks = np.linspace(10.0, 20.0, 12)
-    part = settled(made(*pulses(peaks), separated=2e-3))["A"]
+    part = settled_contacts(made(*pulses(peaks), separated=2e-3))["A"]
     assert (part.since, part.peaks, part.largest_normal_force) == (2e-3, 12, 20.0)
     averages = part.averages
     assert averages.mean_peak_normal_force == pytest.approx(15.0, rel=1e-15)
@@ -72,11 +72,11 @@ def test_peaks_cut_off_at_the_ends_of_the_record_are_none():
 
 
 def test_few_peaks_have_no_mean_and_runs_that_stay_closed_nothing():
-    few = settled(made(*pulses(np.linspace(10.0, 20.0, 9)), separated=2e-3))["A"]
+    few = settled_contacts(made(*pulses(np.linspace(10.0, 20.0, 9)), separated=2e-3))["A"]
     assert few.peaks == 9
     assert few.averages.mean_peak_normal_force is None
     closed = made([5.0] * 50, [1] * 50, separated=None)
-    assert settled(closed) == {}
+    assert settled_contacts(closed) == {}
     assert settled_table(closed) is None
     assert "chaotic" not in (contact_table(closed).caption or "")
 

@@ -39,7 +39,7 @@ from stridor.periodic.harmonic import fourier as fourier_module
 from stridor.periodic.harmonic.balance import Scales, evaluated, scales
 from stridor.periodic.harmonic.birth import still
 from stridor.periodic.harmonic.forced import forced
-from stridor.periodic.harmonic.sampling import coordinates, settled
+from stridor.periodic.harmonic.sampling import coordinates, without_short
 from stridor.system import System
 from stridor.system.model import CubicSprings, Rows
 
@@ -495,7 +495,7 @@ def test_series_that_overshoot_beside_stick_do_not_turn(damping: float | None, f
     ],
 )
 def test_what_lasts_too_short_is_not_told(codes: str, wanted: str):
-    found = settled(np.array([int(c) for c in codes]), 5)
+    found = without_short(np.array([int(c) for c in codes]), 5)
     assert "".join(map(str, found)) == wanted
 
 

@@ -26,7 +26,7 @@ from stridor.modal.krylov import (
     refine,
 )
 from stridor.modal.krylov import modes as modes_over_friction
-from stridor.modal.krylov.follow import State
+from stridor.modal.krylov.follow import BranchState
 from stridor.modal.krylov.passages import crossings
 from stridor.modal.krylov.problem import Varying, problem_of
 from stridor.modal.krylov.reduced import Eigenpairs
@@ -473,11 +473,11 @@ def test_a_branch_that_starts_undamped_is_stable_until_it_grows():
     """At μ = 0 its rate is rounding of either sign: no onset where friction damps it, one where friction drives it."""
 
     def passages(start: float, slope: float):
-        def state(mu: float) -> State:
+        def state(mu: float) -> BranchState:
             values = np.array([start + slope * mu + 1000j, -5.0 + 2000j])
             zero = np.zeros((2, 2), dtype=complex)
             found = Eigenpairs(mu, values, values, zero, zero, np.array([slope, 0.0], dtype=complex), 2)
-            return State(found, np.arange(2))
+            return BranchState(found, np.arange(2))
 
         return crossings(state(0.0), state(0.1))
 

@@ -6,7 +6,7 @@ from .four_answers import GOOD_AMPLITUDE, CycleSeen, FourAnswers
 from .kept import PartStore
 from .perturbation import perturb
 from .result import GOOD_CRITICAL, GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, SAME_DECAY, Agreement, Comparison
-from .settled import SettledVelocity, last_rate, settled
+from .settled import SettledVelocity, last_rate, settled_velocity
 from .shapes import modal_assurance, mode_shape
 from .small_motion import LINEAR, PERTURBATION, Perturbation, linear_part
 
@@ -35,6 +35,6 @@ __all__ = [
     "modal_assurance",
     "mode_shape",
     "perturb",
-    "settled",
+    "settled_velocity",
     "stronger_below",
 ]

@@ -31,7 +31,7 @@ from .kept import PartStore, Plain, float_of, growth_data, growth_of, pair_of, p
 from .pairs import TOGETHER
 from .perturbation import modes_as_in_time, perturb, perturbation_step
 from .result import Agreement, Comparison, Critical, decays_as_none, judge, likeness, overall
-from .settled import SettledVelocity, last_rate, settled, settled_of
+from .settled import SettledVelocity, last_rate, settled_of, settled_velocity
 from .shapes import by_body, mode_shape, span_assurance
 from .small_motion import Perturbation, whole
 
@@ -272,7 +272,7 @@ class _At:
 
     def _answer(self, mu: float, run: Trajectory, modes: ComplexModes) -> _Answer:
         dominant, fitted = dominant_response(run, self.limit)
-        found, why = settled(run, dominant, fitted, last_rate(modes))
+        found, why = settled_velocity(run, dominant, fitted, last_rate(modes))
         unstable = _unstable(modes, self.limit)
         responding = _responding(modes, unstable, dominant) if dominant else None
         if dominant is None or responding is None or not (self.system.lines or self.system.solids):

@@ -43,7 +43,7 @@ def last_rate(modes: ComplexModes) -> float:
     return float(rates.max()) if rates.size else 0.0
 
 
-def settled(
+def settled_velocity(
     run: Trajectory, dominant_hz: float | None, fitted: Growth | None, rate: float
 ) -> tuple[SettledVelocity | None, str]:
     """What a run has settled to, by its dominant line and the growth of that (`dominant_response`); else why nothing

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..agreement import PartStore, dominant_response, last_rate, modal_assurance, settled
+from ..agreement import PartStore, dominant_response, last_rate, modal_assurance, settled_velocity
 from ..asking import FUNCTION, PATH, STORE, SWITCH, takes
 from ..digits import measured
 from ..errors import CaseError, StridorError
@@ -238,7 +238,7 @@ def _beside(inputs: ReportInputs, work: Workspace) -> str:
     if other := other_in_time(work):
         return other
     rate = 0.0 if inputs.modes is None else last_rate(inputs.modes)
-    found, why = settled(run, *dominant_response(run, work.modal.max_frequency_hz), rate)
+    found, why = settled_velocity(run, *dominant_response(run, work.modal.max_frequency_hz), rate)
     return "" if found is not None else why
 
 

@@ -71,7 +71,7 @@ class Followed(Protocol[P]):
         """The direction of the branch at a cycle, forwards as ``along`` says."""
         ...
 
-    def settled(self, point: P, heading: Array, /) -> tuple[P, Array]:
+    def next_start(self, point: P, heading: Array, /) -> tuple[P, Array]:
         """The cycle and its heading as the next step begins with them."""
         ...
 
@@ -136,7 +136,7 @@ def follow(
                 return STOPPED
         if not seen(closed, fold=False):
             return STOPPED
-        spot = BranchPoint(*branch.settled(closed, tangent))
+        spot = BranchPoint(*branch.next_start(closed, tangent))
         length = min(length * 1.5, LARGEST)
     return f"{most} points were made"
 

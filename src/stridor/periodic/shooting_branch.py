@@ -135,7 +135,7 @@ class ShootingBranch:
         """Whether no contact changes any more."""
         return not closed.shot.words
 
-    def settled(self, closed: ClosedShot, heading: Array) -> tuple[ClosedShot, Array]:
+    def next_start(self, closed: ClosedShot, heading: Array) -> tuple[ClosedShot, Array]:
         """The cycle and its heading as the next step begins with them."""
         begun = self.begun_elsewhere(closed)
         return (closed, heading) if begun is closed else (begun, self.carried_over(begun, heading))

@@ -96,7 +96,7 @@ def steady_sliding(
         return Equilibrium(system, nodes, push, force, symmetric=symmetric, solver=solver, rubbing=rubbing)
 
     try:
-        equilibrium, state, iterations = _settled(opposing, nodes, coefficient if rubs else None, guess, held)
+        equilibrium, state, iterations = _with_friction(opposing, nodes, coefficient if rubs else None, guess, held)
     except SingularMatrix as error:
         raise AnalysisError(_loose(system, nodes, error.motion)) from error
     except AnalysisError as error:
@@ -152,7 +152,7 @@ def steady_sliding(
     )
 
 
-def _settled(
+def _with_friction(
     opposing: Callable[[Array], Equilibrium], nodes: ContactNodes, friction: Array | None, guess: BoolArray | None,
     held: BoolArray | None,
 ) -> tuple[Equilibrium, NodeEquilibrium, int]:  # fmt: skip

@@ -211,7 +211,7 @@ class Harmonic:
             elif not end.startswith("it comes to steady sliding"):
                 told(said, Unreached(f"μ = {mu:.6g}, {said}: {end}", expected=not unfinished(end)))
 
-    def settled(
+    def settled_in_time(
         self, work: Workspace, mu: float, known: Sequence[series.Balanced], say: Say,
         told: Callable[[str, series.Balanced | Unreached], None],
     ) -> Settled:  # fmt: skip

@@ -243,7 +243,7 @@ class _CycleSearch:
                 last[:] = [found]
                 self._add(found, said)
 
-        settled = self.method.settled(self.work, mu, [one for _, _, one in known], self._say, told)
+        settled = self.method.settled_in_time(self.work, mu, [one for _, _, one in known], self._say, told)
         if settled.known is not None:
             traced, k, _ = known[settled.known]
             traced.stays.append((mu, k, k + 1))
@@ -285,7 +285,7 @@ class _CycleSearch:
 
         self.method.reached(mu, self.pushes, self._say, told)
         if isinstance(self.method, Harmonic):
-            self.method.settled(self.work, mu, here, self._say, told)
+            self.method.settled_in_time(self.work, mu, here, self._say, told)
 
     def _add(self, closed: Any, said: str) -> None:
         """A cycle, with its branch where a range is asked for that holds it."""

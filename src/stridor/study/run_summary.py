@@ -13,7 +13,7 @@ from ..asking import takes
 from ..digits import hertz
 from ..notebook import Shown
 from ..sliding import full_motion, slip_speeds
-from ..temporal.attractor import settled
+from ..temporal.attractor import settled_contacts
 from ..temporal.changes import changes_of
 from ..temporal.energy import EnergyBalance, energy_balance
 from ..temporal.signals import Growth, components
@@ -73,7 +73,7 @@ class RunSummary(Shown):
             "saturated": None if self.growth is None else self.growth.saturated,
             "contacts": {} if last is None else {name: vars(c).copy() for name, c in last.contacts.items()},
             "first_regime": first_regime(run),
-            "settled": {name: asdict(part) for name, part in settled(run).items()},
+            "settled": {name: asdict(part) for name, part in settled_contacts(run).items()},
             "phases": [
                 {
                     "name": p.name,

@@ -94,7 +94,7 @@ class Spread(Shown):
         return {"runs": self.runs, "perturbation": self.perturbation, "seed": self.seed, "contacts": contacts}
 
 
-def settled(run: Trajectory) -> dict[str, SettledContact]:
+def settled_contacts(run: Trajectory) -> dict[str, SettledContact]:
     """The contacts that separate in the last phase, with averages from there on; others are not chaotic and left out.
 
     From the records: of a peak between two of them only the slope is seen.
@@ -134,7 +134,7 @@ def _peaks(force: Array) -> Array:
 
 def spread(runs: Sequence[Trajectory], perturbation: float, seed: int) -> Spread:
     """Averages of each run, and how far they differ. Contacts that do not separate in all runs are left out."""
-    all_of = [settled(run) for run in runs]
+    all_of = [settled_contacts(run) for run in runs]
     names = [name for name in all_of[0] if all(name in one for one in all_of)]
     mean: dict[str, dict[str, float]] = {}
     deviation: dict[str, dict[str, float]] = {}

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..agreement import GOOD_CRITICAL, GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, SAME_DECAY, Agreement, Comparison
 from ..modal.complex_modes import ComplexModes
-from ..temporal.attractor import settled
+from ..temporal.attractor import settled_contacts
 from ..temporal.energy import EnergyBalance
 from ..temporal.trajectory import Trajectory
 from .inputs import ReportInputs
@@ -61,7 +61,7 @@ def contact_table(trajectory: Trajectory) -> Table:
         "first separation [s]",
     )
     caption = "Counted in every step of the run, not only in the recorded ones; extrema include single impacts."
-    if settled(trajectory):
+    if settled_contacts(trajectory):
         caption += (
             " Contacts separate in the last phase, and such motion is as a rule chaotic: its largest values are those "
             "of this one trajectory and come out different on another machine, unlike the averages of the next table."
@@ -76,7 +76,7 @@ def contact_table(trajectory: Trajectory) -> Table:
 
 def settled_table(trajectory: Trajectory) -> Table | None:
     """Averages from the first separation of the last phase on, None where no contact separates in it."""
-    found = settled(trajectory)
+    found = settled_contacts(trajectory)
     if not found:
         return None
     rows = tuple(

@@ -26,7 +26,7 @@ from .drawing import drawing
 from .levers import friction_range
 from .mode_data import energy_of, participation, shape_of, tornado, tornado_seconds
 from .model_reduced import Reduced
-from .state import State
+from .state import PageState
 from .worker import IDLE
 
 POINTS = 41  # of the curves
@@ -55,7 +55,7 @@ class _Model:
 
 
 class Bench:
-    """Answers states (`State`) piece by piece: send(part, content) with plain data.
+    """Answers states (`PageState`) piece by piece: send(part, content) with plain data.
 
     Parts: "model" (drawing, freedoms), "refused" (what is wrong with the case), "progress" (of large models), "locus"
     (branches over μ), "at" (modes at the μ of the page), "unanswered" (why there are no modes), "onsets", "shape" (the
@@ -67,7 +67,7 @@ class Bench:
         self._reduced: Reduced | None = None
         self._leisure = False
 
-    def __call__(self, state: State, send: Send) -> None:
+    def __call__(self, state: PageState, send: Send) -> None:
         """Answer a state."""
         self._leisure = False
         try:
@@ -91,7 +91,7 @@ class Bench:
         else:
             self._model = None
 
-    def _of(self, state: State, send: Send) -> _Model:
+    def _of(self, state: PageState, send: Send) -> _Model:
         """The model of a state, built where it is another one than before."""
         if self._model is None or self._model.key != state.model:
             self._model = None
@@ -105,7 +105,7 @@ class Bench:
             self._model = model
         return self._model
 
-    def _reduce(self, model: _Model, state: State, send: Send) -> None:
+    def _reduce(self, model: _Model, state: PageState, send: Send) -> None:
         """A reduced model for a large one, or why there is none."""
         self._reduced = None
         try:
@@ -118,7 +118,7 @@ class Bench:
             model.why = f"No reduced model ({error}): every answer takes its time."
         send("progress", {"what": ""})
 
-    def _answer(self, state: State, model: _Model, send: Send) -> None:
+    def _answer(self, state: PageState, model: _Model, send: Send) -> None:
         if model.reduced is not None and model.reduced.holds(state):
             self._answer_reduced(state, model, model.reduced, send)
             return
@@ -147,7 +147,7 @@ class Bench:
         model.idle = model.idle or Unsaved(work.case("the page"))
         self._at_leisure(state, model, model.idle, send)
 
-    def _at_leisure(self, state: State, model: _Model, work: Workspace, send: Send) -> None:
+    def _at_leisure(self, state: PageState, model: _Model, work: Workspace, send: Send) -> None:
         """What takes longer than a slider waits."""
         model.onsets = model.onsets or onsets_of(onsets(work))
         send("onsets", model.onsets)
@@ -162,7 +162,7 @@ class Bench:
         else:
             send("tornado", tornado(work, state.mu, state.branch))
 
-    def _answer_reduced(self, state: State, model: _Model, reduced: Reduced, send: Send) -> None:
+    def _answer_reduced(self, state: PageState, model: _Model, reduced: Reduced, send: Send) -> None:
         """On a reduced model: first the modes at the μ of the page, then the curves."""
         here, error_of = reduced.here(state, vectors=state.branch is not None)
         at = modes_at(here, state.mu, checked=False)
@@ -242,7 +242,7 @@ def _built(model: _Model) -> System:
     return system
 
 
-def _asked_for(state: State, seconds: float) -> dict[str, Any]:
+def _asked_for(state: PageState, seconds: float) -> dict[str, Any]:
     """In place of sensitivities that take a while: about how long [s], for whoever wants them all the same."""
     return {"branch": state.branch, "mu": state.mu, "bars": [], "warnings": [], "seconds": seconds}
 

@@ -24,7 +24,7 @@ from ...study.workspace import Workspace
 from ...typing import IntArray
 from .levers import friction_range
 from .mode_data import tornado_seconds
-from .state import State, checked
+from .state import PageState, checked
 
 FRICTION, STIFFNESS = "mu", "contact_stiffness"
 REACH = (0.1, 10.0)  # times the contact stiffness of the case
@@ -78,7 +78,7 @@ class Reduced:
     _line: _Line | None = None
 
     @staticmethod
-    def made(state: State, tell: Tell) -> Reduced:
+    def made(state: PageState, tell: Tell) -> Reduced:
         """The model of a state's case, as it stands but for what the model is over. tell: what is under way. Raises
         AnalysisError where there is none."""
         began = time.perf_counter()
@@ -100,11 +100,11 @@ class Reduced:
         seconds = tornado_seconds(case, state.mu, solve=took, build=build)
         return Reduced(model, work, path, words, base_of(state).model, seconds, quick)
 
-    def holds(self, state: State) -> bool:
+    def holds(self, state: PageState) -> bool:
         """Whether a state differs in nothing but what the model is over, and lies in the ranges of that."""
         return base_of(state).model == self.base and self.model.problem.inside(self._point(state))
 
-    def here(self, state: State, *, vectors: bool = False) -> tuple[ComplexModes, Callable[[], float]]:
+    def here(self, state: PageState, *, vectors: bool = False) -> tuple[ComplexModes, Callable[[], float]]:
         """Modes at the μ of a state, and what estimates the largest error of their λ, relative, which takes some of a
         slider's time. Their numbers are those of the nearest point where they are known, until `sweep` has followed
         them from μ = 0."""
@@ -115,7 +115,7 @@ class Reduced:
         made = self._modes([found], [numbers], vectors=vectors)
         return made, lambda: float(self.model.judged(found).error.max(initial=0.0))
 
-    def sweep(self, state: State) -> Iterator[tuple[ComplexModes, float]]:
+    def sweep(self, state: PageState) -> Iterator[tuple[ComplexModes, float]]:
         """Branches over the range of μ and at the μ of a state, and the largest estimated error: of few points first,
         then of all. Numbers of the first may differ from those of the second, which follow in smaller steps."""
         low, high = friction_range(self.work.case("the page"))
@@ -160,7 +160,7 @@ class Reduced:
         numbered = [Numbered(restricted.model, restricted.inside(one.modes), one.numbers) for one in self._numbered]
         self._line = _Line(known[0].point.get(STIFFNESS), restricted, numbered)
 
-    def onsets(self, state: State) -> dict[str, Any]:
+    def onsets(self, state: PageState) -> dict[str, Any]:
         """Onsets found on the model, each solved in the full problem, as `bench.onsets_of` has them."""
         point = self._point(state)
         found = onsets_along(self.model, FRICTION, {k: v for k, v in point.items() if k != FRICTION})
@@ -173,14 +173,14 @@ class Reduced:
         ]
         return onsets_on_page(found, (low, high), growing)
 
-    def _point(self, state: State) -> dict[str, float]:
+    def _point(self, state: PageState) -> dict[str, float]:
         point = {FRICTION: state.mu}
         if self.stiffness_path:
             own = float(_stiffness(self.work.case("the page"), self.stiffness_path))
             point[STIFFNESS] = state.changes.get(self.stiffness_path, own) / own
         return point
 
-    def _numbers(self, found: ReducedModes, state: State) -> IntArray:
+    def _numbers(self, found: ReducedModes, state: PageState) -> IntArray:
         """Numbers (k,) by frequency at μ = 0, followed to a point; 0 where that is not known."""
         at = found.point[FRICTION]
         if at == 0.0:
@@ -236,7 +236,7 @@ def _quick(model: ReducedModel, box: Mapping[str, tuple[float, float]]) -> Restr
     return Restricted.of(model, known, share=QUICK)
 
 
-def base_of(state: State) -> State:
+def base_of(state: PageState) -> PageState:
     """The state without what a reduced model is over."""
     path = stiffness_path(checked(state.source))
     return replace(state, changes={k: v for k, v in state.changes.items() if k != path})

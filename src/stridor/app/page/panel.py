@@ -10,7 +10,7 @@ from nicegui import context, ui
 
 from .runs import Run, Wish
 from .session import Session, started
-from .state import State
+from .state import PageState
 
 
 class Panel:
@@ -22,7 +22,7 @@ class Panel:
     def __init__(self, session: Session, script: str, file: str, *, stop: str) -> None:
         self.session, self.client = session, context.client
         self.run: Run | None = None
-        self.of: State | None = None
+        self.of: PageState | None = None
         self._script_name = script
         ui.add_body_html(f"<script>{asset(file)}</script>")
         ui.on(stop, self._stop)

@@ -12,7 +12,7 @@ from ...errors import CaseError
 from .panel import Panel
 from .runs import ENDS, What, Wish
 from .session import Session
-from .state import State, file_text
+from .state import PageState, file_text
 
 _PARTS = """
 <h2 id="st-both-title">Do both approaches agree?</h2>
@@ -72,7 +72,7 @@ class _Panel(Panel):
             super().heard(part, content)
 
 
-def _text(state: State) -> str:
+def _text(state: PageState) -> str:
     """The case as it is, the μ of the page in it and compared at that one alone: the report tells of a case, not of a
     page. Raises CaseError."""
     from ...case import loads

@@ -13,7 +13,7 @@ from .levers import Lever, friction_range
 from .panel import Panel
 from .runs import ENDS, Wish
 from .session import Session
-from .state import State, checked, friction_changes
+from .state import PageState, checked, friction_changes
 
 FRICTION = "mu"
 WIDE = (0.3, 3.0)  # times a number that spans decades: the range that is offered
@@ -142,7 +142,7 @@ class _Panel(Panel):
         self.script("here", at, _others(of, self.axes) != _others(now, self.axes))
 
 
-def _others(state: State, axes: tuple[str, str]) -> Any:
+def _others(state: PageState, axes: tuple[str, str]) -> Any:
     """What of a state is neither of the two numbers."""
     mu = None if FRICTION in axes else state.mu
     return mu, {path: value for path, value in state.changes.items() if path not in axes}

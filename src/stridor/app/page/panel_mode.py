@@ -14,7 +14,7 @@ from ...view.mode_page import animation_shell
 from .panel import Panel
 from .runs import Wish
 from .session import Session
-from .state import State
+from .state import PageState
 
 _PARTS = """
 <section class="st-modes" aria-labelledby="st-modes-title">
@@ -46,7 +46,7 @@ def build(container: ui.element, session: Session) -> None:
         _Panel(session)
 
 
-def is_of(shape: Mapping[str, Any], state: State) -> bool:
+def is_of(shape: Mapping[str, Any], state: PageState) -> bool:
     """Whether a shape is that of the mode, at the μ and of the model that the page is at, and has its eigenvalue."""
     found = tuple(shape.get(name) for name in ("branch", "mu", "stamp"))
     return found == (state.branch, state.mu, state.stamp) and "growth_rate" in shape

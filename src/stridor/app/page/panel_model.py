@@ -10,7 +10,7 @@ from nicegui import events, ui
 from ...case import Case
 from .levers import STEPS, Lever, friction_range
 from .session import Session
-from .state import State, checked, different_frictions
+from .state import PageState, checked, different_frictions
 
 
 def build(container: ui.element, session: Session) -> None:
@@ -32,7 +32,7 @@ def build(container: ui.element, session: Session) -> None:
     ui.on("stridor-move", moved)
 
 
-def lever_values(state: State, found: list[Lever]) -> dict[str, float]:
+def lever_values(state: PageState, found: list[Lever]) -> dict[str, float]:
     """Where each lever stands, by its path."""
     return {"mu": state.mu, **{lever.path: state.changes.get(lever.path, lever.value) for lever in found}}
 

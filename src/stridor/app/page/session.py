@@ -13,7 +13,7 @@ from ...errors import CaseError
 from .folders import new_folder
 from .levers import Lever, levers
 from .runs import Queue, Run, Wish
-from .state import History, Source, State, checked, file_text, first_state, from_link, to_link
+from .state import History, PageState, Source, checked, file_text, first_state, from_link, to_link
 from .worker import BENCH, Program, Worker
 
 LARGEST_MU = 10.0  # friction coefficient of the page: what is beyond takes minutes, and is none
@@ -55,7 +55,7 @@ class Session:
         self._runs: list[Run] = []
         self._ending = threading.Lock()
         self._moving: object = None
-        self._opening: tuple[int, State] | None = None  # question and state of a case that is not on the page yet
+        self._opening: tuple[int, PageState] | None = None  # question and state of a case that is not on the page yet
         self._given_up: set[int] = set()  # questions of those that never came to be on it
         self.picture = Picture()
         self.heard = 0  # number of the newest move of the page that has come here
@@ -67,7 +67,7 @@ class Session:
     # -- what a panel reads ---------------------------------------------------------------------------------------
 
     @property
-    def state(self) -> State:
+    def state(self) -> PageState:
         """What the page is at."""
         return self._history.now
 
@@ -113,7 +113,7 @@ class Session:
 
     # -- what a control does --------------------------------------------------------------------------------------
 
-    def go(self, state: State, *, moving: object = None) -> None:
+    def go(self, state: PageState, *, moving: object = None) -> None:
         """To another state. moving: what is being moved, of which all moves in a row are one step for undo."""
         together = moving is not None and moving == self._moving
         if state == self.state:
@@ -225,8 +225,8 @@ class Session:
 
     # -- inside ---------------------------------------------------------------------------------------------------
 
-    def _try_out(self, state: State) -> None:
-        """Build the model of another case, and go to it where that is not refused (`_settled`)."""
+    def _try_out(self, state: PageState) -> None:
+        """Build the model of another case, and go to it where that is not refused (`_decided`)."""
         if state == self.state:
             if self._opening is not None:
                 self.compute()
@@ -237,14 +237,14 @@ class Session:
         self._opening = self.picture.number, state
         self._tell("progress", {"what": f"{state.source.name} is being opened"})
 
-    def _opened(self) -> State:
+    def _opened(self) -> PageState:
         """The state that was being opened, which it is no more."""
         assert self._opening is not None, "asked for where there is one"
         state, self._opening = self._opening[1], None
         self._tell("progress", {"what": ""})
         return state
 
-    def _settled(self, part: str, content: Any) -> bool:
+    def _decided(self, part: str, content: Any) -> bool:
         """With the first that is heard of a case that is being opened: whether it is the page's now. Else the page
         stays at the one before, whose picture is asked for again, as the process has turned to the other meanwhile."""
         state = self._opened()
@@ -281,7 +281,7 @@ class Session:
             return
         if number in self._given_up:
             return
-        if self._opening is not None and number == self._opening[0] and not self._settled(part, content):
+        if self._opening is not None and number == self._opening[0] and not self._decided(part, content):
             return
         picture = self.picture
         if part == "done":

@@ -1,6 +1,6 @@
 """What a page shows, as one frozen value: the case, what was changed in it, and what is chosen.
 
-Every control makes another `State`; undo and redo walk along those before and after, and a link holds one.
+Every control makes another `PageState`; undo and redo walk along those before and after, and a link holds one.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class State:
+class PageState:
     """A case by its source, numbers changed in it by their dotted paths, and what is looked at.
 
     mu: the friction coefficient of every contact; branch: the mode chosen, by its number, or None.
@@ -72,7 +72,7 @@ class State:
         case = checked(self.source)
         return case.with_(dict(self.changes)) if self.changes else case
 
-    def with_change(self, path: str, value: float) -> State:
+    def with_change(self, path: str, value: float) -> PageState:
         """With another number at a path; what the case has itself is no change."""
         changes = {k: v for k, v in self.changes.items() if k != path}
         return replace(self, changes={**changes, path: float(value)})
@@ -127,9 +127,9 @@ def _files_named(text: str) -> list[str]:
     return found
 
 
-def first_state(source: Source) -> State:
+def first_state(source: Source) -> PageState:
     """A source as it is, at the friction of the case (`own_friction`). Raises CaseError."""
-    return State(source, mu=own_friction(checked(source)))
+    return PageState(source, mu=own_friction(checked(source)))
 
 
 def own_friction(case: Case) -> float:
@@ -154,12 +154,12 @@ def frictionless(case: Case) -> set[str]:
 class History:
     """The states of a page: the present one, those before and those that were taken back."""
 
-    def __init__(self, first: State) -> None:
+    def __init__(self, first: PageState) -> None:
         self.now = first
-        self._before: list[State] = []
-        self._after: list[State] = []
+        self._before: list[PageState] = []
+        self._after: list[PageState] = []
 
-    def go(self, state: State, *, together: bool = False) -> None:
+    def go(self, state: PageState, *, together: bool = False) -> None:
         """To another state. together: one step for undo with the state before, as for a slider that is being moved."""
         if state == self.now:
             return
@@ -195,7 +195,7 @@ class History:
         return bool(self._after)
 
 
-def to_link(state: State, own: Mapping[str, Source]) -> str:
+def to_link(state: PageState, own: Mapping[str, Source]) -> str:
     """The state as letters for an address, "" where that gets too long. own: sources that the server has by itself
     (`key`), of which the link holds no more than the key."""
     held = next((key for key, source in own.items() if source == state.source), None)
@@ -208,7 +208,7 @@ def to_link(state: State, own: Mapping[str, Source]) -> str:
     return text if len(text) <= LARGEST_LINK else ""
 
 
-def from_link(text: str, own: Mapping[str, Source]) -> State:
+def from_link(text: str, own: Mapping[str, Source]) -> PageState:
     """The state that a link holds, read as data. Raises CaseError where it holds none."""
     try:
         if len(text) > LARGEST_LINK:
@@ -224,7 +224,7 @@ def from_link(text: str, own: Mapping[str, Source]) -> State:
         raise CaseError("link", None, "holds no state of this page; copy it again, whole") from None
 
 
-def _state_of(document: Any, own: Mapping[str, Source]) -> State:
+def _state_of(document: Any, own: Mapping[str, Source]) -> PageState:
     if "of" in document:
         source = own[str(document["of"])]
     else:
@@ -235,7 +235,7 @@ def _state_of(document: Any, own: Mapping[str, Source]) -> State:
     branch, tab, mu = document["branch"], document["tab"], _number(document["mu"])
     if tab not in TABS or mu < 0 or not (branch is None or isinstance(branch, int)):
         raise ValueError("no such state")
-    return State(source, changes, mu, branch, tab)
+    return PageState(source, changes, mu, branch, tab)
 
 
 def _number(value: object) -> float:
@@ -249,7 +249,7 @@ def template_sources() -> dict[str, Source]:
     return {f"template:{name}": Source.template(name) for name in templates()}
 
 
-def file_text(state: State) -> str:
+def file_text(state: PageState) -> str:
     """The case file with its changes in it: the comments of the original stay. Raises CaseError."""
     import tomlkit
     from tomlkit.exceptions import TOMLKitError
@@ -269,7 +269,7 @@ def file_text(state: State) -> str:
     return wanted.text  # without the comments, but it is this case
 
 
-def friction_changes(state: State) -> dict[str, float]:
+def friction_changes(state: PageState) -> dict[str, float]:
     """What the μ of the page changes in the case: every contact's law scaled, as all analyses do with a μ."""
     case = state.case()
     if not different_frictions(case) and math.isclose(state.mu, own_friction(case), rel_tol=1e-12):

@@ -16,7 +16,7 @@ import numpy as np
 from ...typing import Array
 from .curve import StabilityCurve, hermite
 from .plane import Plane
-from .spot import CurvePoint, settled
+from .spot import CurvePoint, point_on
 
 LONGEST, SHORTEST = 0.15, 1e-6  # steps, in shares of the ranges
 FIRST = 0.02
@@ -186,7 +186,7 @@ def _corrected(plane: Plane, way: _MarchState, target: Array, direction: Array, 
     omega = spot.omega + float(spot.turn @ (target - spot.p))
     if spot.kind != "standstill" and omega <= plane.rest_limit:
         return None
-    return settled(plane, spot.kind, chord, omega, spot.right, spot.left)
+    return point_on(plane, spot.kind, chord, omega, spot.right, spot.left)
 
 
 def _follows(plane: Plane, way: _MarchState, new: CurvePoint) -> bool:
@@ -259,7 +259,7 @@ def _between(
     (middle,) = hermite(old.p, heading, new.p, heading_to, np.array([0.5]))
     across = _rotated(new.p - old.p, 0.5 * np.pi) / length
     chord = plane.chord(middle, across, (-0.3 * length, 0.3 * length))
-    spot = settled(plane, old.kind, chord, 0.5 * (old.omega + new.omega), old.right, old.left)
+    spot = point_on(plane, old.kind, chord, 0.5 * (old.omega + new.omega), old.right, old.left)
     if spot is None or not _like(plane, old, spot):
         return [], 0.0, int(length > tolerance)
     off = float(np.hypot(*(spot.p - middle)))

@@ -25,7 +25,7 @@ from .curve import Crossing, Drawn, StabilityCurve, crossings
 from .march import joined, traced, without_points
 from .passing import FINEST, refined
 from .plane import Count, Plane
-from .spot import CurvePoint, Kind, settled
+from .spot import CurvePoint, Kind, point_on
 
 LINES = 5  # in both directions
 ROUNDS = 4  # of further lines
@@ -196,7 +196,7 @@ class _CurveSearch:
         omega = 2 * np.pi * onset.frequency_hz
         chord = self.plane.chord(p, np.eye(2)[1 - line.axis], (-REACH, REACH))
         right, left = chord.null_vectors(1j * omega, 0.0)
-        return settled(self.plane, kind, chord, omega, right.astype(complex), left.astype(complex))
+        return point_on(self.plane, kind, chord, omega, right.astype(complex), left.astype(complex))
 
     # -- counts -------------------------------------------------------------------------------------------------------
     def _look(self, p: Array) -> None:

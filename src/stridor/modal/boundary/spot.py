@@ -45,7 +45,7 @@ class CurvePoint:
         return np.array([self.gradient[1], -self.gradient[0]]) / np.hypot(*self.gradient)
 
 
-def settled(
+def point_on(
     plane: Plane, kind: Kind, chord: Chord, omega: float, right: ComplexArray, left: ComplexArray
 ) -> CurvePoint | None:
     """The point of a curve on a chord, from a guess at its a = 0; None where Newton's method does not settle on it."""

@@ -17,7 +17,7 @@ from ...typing import ComplexArray
 from ..at_rest import moving
 from ..dense_problem import eigenvalues
 from ..krylov.exceptional import exceptional_point
-from ..krylov.follow import State
+from ..krylov.follow import BranchState
 from ..krylov.passages import Passage
 from ..newton import FLAT, Root
 from ..onset import Onset
@@ -173,7 +173,9 @@ def _is_above(passage: Passage, frequency: float) -> bool:
     return bool(lam.imag > frequency and not ahead.imag < frequency)
 
 
-def _throughout(family: Family, states: tuple[State, State], ends: tuple[RegionModes, RegionModes], top: float) -> int:
+def _throughout(
+    family: Family, states: tuple[BranchState, BranchState], ends: tuple[RegionModes, RegionModes], top: float
+) -> int:
     """How many modes diverge faster than the band at both ends, and were not followed: branches start in the band."""
     alone: list[int] = []
     for state, end in zip(states, ends, strict=True):
@@ -183,7 +185,7 @@ def _throughout(family: Family, states: tuple[State, State], ends: tuple[RegionM
     return alone[0] if alone[0] == alone[1] else 0
 
 
-def _agree(family: Family, state: State, end: RegionModes, top: float, fast: int) -> bool:
+def _agree(family: Family, state: BranchState, end: RegionModes, top: float, fast: int) -> bool:
     """Whether the followed modes that grow in the band are those found in full, but for ``fast`` that diverge at every
     μ beyond what is followed."""
     mine = state.values[unstable(family, state.values, top) & (state.values.imag <= top)]
@@ -199,7 +201,7 @@ def _same(one: Onset, other: Onset, family: Family) -> bool:
     return near and abs(one.frequency_hz - other.frequency_hz) <= 1e-7 * max(one.frequency_hz, 1e-300)
 
 
-def _opening(source: Along, end: RegionModes, state: State, top: float) -> list[BranchOnset]:
+def _opening(source: Along, end: RegionModes, state: BranchState, top: float) -> list[BranchOnset]:
     """Growth that begins at the very start, where nothing damps: of an eigenvalue that friction drives off the axis at
     once, or of equal ones that it splits (modes of bodies that turn into themselves)."""
     assert end.left is not None, "asked for at the low end"
@@ -240,7 +242,7 @@ def _opening(source: Along, end: RegionModes, state: State, top: float) -> list[
     return result
 
 
-def _opened(source: Along, state: State) -> dict[int, Opening]:
+def _opened(source: Along, state: BranchState) -> dict[int, Opening]:
     """Branches from 0, in the state at the low end, and what becomes of those modes that are told."""
     return {int(np.argmin(np.abs(state.values - o.series[0]))): o for o in source.opened}
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import AnalysisError
 from ..histories import Entries
-from ..krylov.follow import Follower, State
+from ..krylov.follow import BranchState, Follower
 from ..krylov.passages import Passage, crossings, meetings
 from .basis import Along
 from .foretold import changes_within
@@ -28,8 +28,8 @@ class Followed:
     what does both in one leaves nothing at its ends."""
 
     source: Along
-    low: State
-    high: State
+    low: BranchState
+    high: BranchState
     passages: tuple[Passage, ...]
     entries: Entries
     unsure: tuple[float, ...]
@@ -41,7 +41,7 @@ def follower(
     *,
     finer: int = 1,
     most: int | None = None,
-    watch: Callable[[State, State], None] | None = None,
+    watch: Callable[[BranchState, BranchState], None] | None = None,
     unsure: Callable[[float], None],
 ) -> Follower:
     """Follows all branches of a source from where they get their numbers.
@@ -53,7 +53,7 @@ def follower(
     family, steps = source.family, 0
     most = finer * MOST_STEPS[source.whole] if most is None else most
 
-    def seen(old: State, new: State) -> None:
+    def seen(old: BranchState, new: BranchState) -> None:
         nonlocal steps
         steps += 1
         if steps > most:
@@ -88,7 +88,7 @@ def followed(source: Along, low: float, high: float, top: float, finer: int = 1)
     unsure: list[float] = []
     foretold: list[tuple[float, float]] = []
 
-    def watch(old: State, new: State) -> None:
+    def watch(old: BranchState, new: BranchState) -> None:
         passages.extend(meetings(source, old, new) if family.reversible else crossings(old, new))
         entries.watch((old.mu, new.mu), old.values, new.values, range(len(old.index)))
         sides = ((old.found, new.mu - old.mu), (new.found, old.mu - new.mu))
@@ -102,7 +102,7 @@ def followed(source: Along, low: float, high: float, top: float, finer: int = 1)
     return Followed(source, first, last, tuple(passages), entries, tuple(unsure), tuple(foretold))
 
 
-def _surely(source: Along, old: State, new: State) -> bool:
+def _surely(source: Along, old: BranchState, new: BranchState) -> bool:
     """Whether the branches of two states belong together beyond doubt, or are one eigenvalue twice."""
     distance = np.abs(old.coordinate[:, None] - new.coordinate)
     own = distance[np.arange(len(distance)), np.arange(len(distance))]

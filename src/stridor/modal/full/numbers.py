@@ -14,7 +14,7 @@ from ...errors import AnalysisError
 from ...threads import one_thread
 from ...typing import Array, ComplexArray, IntArray
 from ..at_rest import double_zeros, moving
-from ..krylov.follow import State
+from ..krylov.follow import BranchState
 from ..quadratic.polish import pairs
 from .basis import DECAY, Along, along
 from .family import Family, SystemFamily
@@ -87,7 +87,7 @@ def _followed(
     return BranchNumbers(of, f" Numbers are those by frequency at {low}, from where branches were followed.")
 
 
-def _ranks(start: State, top: float) -> IntArray:
+def _ranks(start: BranchState, top: float) -> IntArray:
     """Numbers from 1 (b,) of the branches where they begin: those of the band by frequency, then the others."""
     values = start.values
     inside = (values.imag <= top * (1 + 1e-12)) & (values.real >= -DECAY * top)
@@ -98,7 +98,7 @@ def _ranks(start: State, top: float) -> IntArray:
 
 
 def _assign(
-    source: Along, state: State, own: IntArray, values: ComplexArray, of: IntArray, top: float, most: int
+    source: Along, state: BranchState, own: IntArray, values: ComplexArray, of: IntArray, top: float, most: int
 ) -> int:
     """Number the eigenvalues at one μ in place; returns the largest number used so far."""
     still = at_rest(source.family, values, top) if source.at_rest else np.zeros(0, dtype=np.int64)

@@ -76,7 +76,7 @@ def told(family: Family, lam: complex, x: ComplexArray, y: ComplexArray) -> Open
         return None
     border = Border(family, x, y)
     try:
-        settled = _settled(family, border, lam)
+        settled = _on_axis(family, border, lam)
         if settled is None:
             return None
         lam, here = settled
@@ -107,7 +107,7 @@ def told(family: Family, lam: complex, x: ComplexArray, y: ComplexArray) -> Open
     return replace(opening, root=root) if near else None
 
 
-def _settled(family: Family, border: Border, lam: complex) -> tuple[complex, NewtonPoint] | None:
+def _on_axis(family: Family, border: Border, lam: complex) -> tuple[complex, NewtonPoint] | None:
     """The eigenvalue at the low end near λ and what is known there; None where that does not settle on the axis."""
     lam = 1j * lam.imag
     for _ in range(STEPS):

@@ -12,7 +12,7 @@ import scipy.linalg as sl
 from ...typing import ComplexArray
 from ..krylov.crossing import crossing as reduced_crossing
 from ..krylov.double import pair_near
-from ..krylov.follow import Follower, State
+from ..krylov.follow import BranchState, Follower
 from ..krylov.passages import Passage
 from ..krylov.undamped import COMPLEX
 from ..newton import Root, crossing, meeting, standstill
@@ -145,7 +145,7 @@ def _by_square(source: Along, passage: Passage) -> Iterator[Guess]:
             high, last = t, value
 
 
-def _guess(source: Along, state: State, index: int, t: float) -> Guess:
+def _guess(source: Along, state: BranchState, index: int, t: float) -> Guess:
     found = state.found
     return _expanded(source, t, complex(found.values[index]), found.right[:, [index]], found.left[:, [index]])
 

@@ -26,7 +26,7 @@ from .carried import Carried
 from .crossing import NEAR_AXIS, Solved, crossing, crossing_again
 from .double import divergence, double, meeting
 from .exceptional import exceptional_point
-from .follow import Follower, State
+from .follow import BranchState, Follower
 from .modes import samples
 from .passages import Passage
 from .passages import passages as changes
@@ -122,7 +122,7 @@ def _count_of_samples(low: float, high: float) -> int:
     return max(FEWEST, round(SAMPLES * (1.0 - low / high)))
 
 
-def _numbered(state: State) -> tuple[IntArray, ComplexArray]:
+def _numbered(state: BranchState) -> tuple[IntArray, ComplexArray]:
     """Numbers and eigenvalues (b,) of the branches at one μ."""
     return np.arange(1, len(state.index) + 1), state.values
 
@@ -139,13 +139,13 @@ def _entering(way: _Way, changes: list[StabilityChange], low: float) -> tuple[tu
     return tuple(found)
 
 
-def _growing(reduced: Reduced, state: State, top: float) -> BoolArray:
+def _growing(reduced: Reduced, state: BranchState, top: float) -> BoolArray:
     """Which branches (b,) grow beyond rounding."""
     values = state.values if reduced.damped else off_rounding(state.values, SPLIT_RELATIVE)
     return grows(values, top)
 
 
-def _inside(reduced: Reduced, state: State, top: float) -> BoolArray:
+def _inside(reduced: Reduced, state: BranchState, top: float) -> BoolArray:
     """Which branches (b,) grow in the band."""
     return _growing(reduced, state, top) & (state.values.imag <= top)
 
@@ -167,8 +167,8 @@ class _Way:
     """Branches over the range: states at both ends, changes of stability, entries into the band, and the branches that
     grow at its low end."""
 
-    start: State
-    end: State
+    start: BranchState
+    end: BranchState
     passages: list[Passage]
     entries: Entries
     from_start: list[int]
@@ -179,7 +179,7 @@ def _way(reduced: Reduced, between: tuple[float, float], top: float, numbered_at
     passages: list[Passage] = []
     entries = Entries(top)
 
-    def watch(old: State, new: State) -> None:
+    def watch(old: BranchState, new: BranchState) -> None:
         passages.extend(changes(reduced, old, new))
         entries.watch((old.mu, new.mu), old.values, new.values, range(len(old.index)))
 

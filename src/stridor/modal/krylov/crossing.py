@@ -10,7 +10,7 @@ import scipy
 
 from ..dense_problem import DenseProblem, Eigenpairs
 from ..newton import crossing as on_axis
-from .follow import Follower, State
+from .follow import BranchState, Follower
 from .passages import Passage
 
 NEAR_AXIS = 1e-6  # of the band: below it a frequency is zero
@@ -85,10 +85,10 @@ def _quick_crossing(reduced: DenseProblem, passage: Passage) -> tuple[float, com
     return root.mu, root.lam, root.slope
 
 
-def _slow_crossing(reduced: DenseProblem, passage: Passage, start: State) -> tuple[float, complex, float] | None:
+def _slow_crossing(reduced: DenseProblem, passage: Passage, start: BranchState) -> tuple[float, complex, float] | None:
     """The same by bisection on all branches."""
 
-    def at(mu: float) -> State:
+    def at(mu: float) -> BranchState:
         return Follower.resumed(reduced, start).advance(mu)
 
     mu = root_between(lambda m: float(at(m).values[passage.branch].real), passage.low, passage.high)
@@ -128,7 +128,7 @@ def _by_growth(reduced: DenseProblem, passage: Passage) -> tuple[float, complex,
     return mu, 1j * lam.imag, slope
 
 
-def _again(reduced: DenseProblem, passage: Passage) -> State | None:
+def _again(reduced: DenseProblem, passage: Passage) -> BranchState | None:
     """The state before a passage with the basis as it is now."""
     found = reduced.eigenpairs(passage.low)
     if passage.old.found is found:
@@ -136,4 +136,4 @@ def _again(reduced: DenseProblem, passage: Passage) -> State | None:
     distance = np.abs(passage.old.coordinate[:, None] - found.coordinate)
     index = np.argmin(distance, axis=1)
     near = distance[passage.branch, index[passage.branch]] <= 1e-3 * np.abs(passage.old.coordinate[passage.branch])
-    return State(found, index) if near else None
+    return BranchState(found, index) if near else None

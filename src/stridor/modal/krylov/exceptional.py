@@ -12,12 +12,14 @@ from ...typing import ComplexArray
 from ..dense_problem import DenseProblem, Eigenpairs
 from ..newton import exceptional
 from .double import pair_near
-from .follow import State
+from .follow import BranchState
 
 NEIGHBOURS = 12  # eigenvectors that span the surroundings of an eigenvalue
 
 
-def exceptional_point(reduced: DenseProblem, state: State, lam: complex, mu: float) -> tuple[complex, float] | None:
+def exceptional_point(
+    reduced: DenseProblem, state: BranchState, lam: complex, mu: float
+) -> tuple[complex, float] | None:
     """The complex μ beside an onset at which two modes meet, and κ of λ ≈ λ_c ± κ √(μ − μ_c).
 
     Sought with the modes nearby at a state before it, then solved for. None where it is further away than half the

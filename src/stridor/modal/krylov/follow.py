@@ -31,7 +31,7 @@ FOLLOWED = 1.25  # branches are followed up to this much above the band
 
 
 @dataclass(frozen=True)
-class State:
+class BranchState:
     """Branches (b,) at one μ: their indices among the eigenpairs found there."""
 
     found: Eigenpairs
@@ -72,19 +72,19 @@ class Follower:
         start: float = 0.0,
         longest: float = 0.05,
         named: int | None = None,
-        watch: Callable[[State, State], None] | None = None,
+        watch: Callable[[BranchState, BranchState], None] | None = None,
     ) -> None:
         self.source = source
         self.longest, self.watch = longest, watch
         found = source.eigenpairs(start)
         followed = np.flatnonzero(np.abs(found.values) <= FOLLOWED * source.frequency)
         order = np.lexsort((np.abs(found.values[followed]), np.abs(found.values[followed].imag)))
-        self.state = State(found, followed[order])
+        self.state = BranchState(found, followed[order])
         self.named = len(order) if named is None else named
         self._step = longest
 
     @classmethod
-    def resumed(cls, source: OverNumber, state: State) -> Follower:
+    def resumed(cls, source: OverNumber, state: BranchState) -> Follower:
         """A follower that goes on from a state followed before, and watches nothing."""
         follower = cls.__new__(cls)
         follower.source, follower.state = source, state
@@ -93,7 +93,7 @@ class Follower:
         return follower
 
     @passing()
-    def advance(self, mu: float) -> State:
+    def advance(self, mu: float) -> BranchState:
         """Follow to ``mu``, not below the present one. Raises FollowingError where it gets nowhere."""
         tried, since = 0, self.state.mu
         while self.state.mu < mu:
@@ -117,7 +117,7 @@ class Follower:
             if index is None:
                 self._step = step / 4
                 continue
-            new = _named(self.state, State(found, index))
+            new = _named(self.state, BranchState(found, index))
             if new is None:
                 self._step = step / 4
                 continue
@@ -128,14 +128,14 @@ class Follower:
         return self.state
 
 
-def _coincide(old: State, found: Eigenpairs) -> bool:
+def _coincide(old: BranchState, found: Eigenpairs) -> bool:
     """Whether modes that were apart all but coincide in the next state."""
     mine, theirs = (np.sort_complex(x) for x in (old.coordinate, found.coordinate))
     near = [int(np.count_nonzero(np.abs(np.diff(x)) <= COINCIDENT * np.abs(x[1:]))) for x in (mine, theirs)]
     return near[1] > near[0]
 
 
-def matched(old: State, found: Eigenpairs, named: int, *, surely: bool = True) -> IntArray | None:
+def matched(old: BranchState, found: Eigenpairs, named: int, *, surely: bool = True) -> IntArray | None:
     """Places (b,) among ``found`` of the branches of ``old``; None where that is not clear for the first ``named`` of
     them and ``surely`` is asked. Raises FollowingError where there is nothing left to be among."""
     half = 0.5 * (found.mu - old.mu)
@@ -172,7 +172,7 @@ def _moved(coordinate: ComplexArray, by: ComplexArray) -> ComplexArray:
     return np.where(np.isfinite(by) & (np.abs(by) < reach), coordinate + by, coordinate)
 
 
-def _named(old: State, new: State) -> State | None:
+def _named(old: BranchState, new: BranchState) -> BranchState | None:
     """The new state with the names that are a matter of taste given by rule, so that rounding has no say; None where
     the step is too long to tell.
 
@@ -195,10 +195,10 @@ def _named(old: State, new: State) -> State | None:
     # Without damping pairs are matched by rule already.
     if np.all(was == old.values) and not _agreed(old, new, index):
         return None
-    return State(new.found, index)
+    return BranchState(new.found, index)
 
 
-def _agreed(old: State, new: State, index: IntArray) -> bool:
+def _agreed(old: BranchState, new: BranchState, index: IntArray) -> bool:
     """Exchange, in ``index``, damped modes that have met or passed one another where they bear each other's names;
     False where a shorter step must tell."""
     x, slopes, x_to, slopes_to = old.coordinate, old.tangents, new.coordinate, new.tangents
@@ -221,7 +221,7 @@ def _agreed(old: State, new: State, index: IntArray) -> bool:
     return sure
 
 
-def _clear(old: State, found: Eigenpairs, index: IntArray, distance: Array) -> BoolArray:
+def _clear(old: BranchState, found: Eigenpairs, index: IntArray, distance: Array) -> BoolArray:
     """Whether each branch's match (b,) is beyond doubt."""
     mine = distance[np.arange(len(index)), index]
     others = distance.copy()
@@ -245,7 +245,9 @@ def _double(before: ComplexArray, after: ComplexArray) -> BoolArray:
     return np.any(near[0] & near[1] & ~one, axis=1) & (moved <= STRAIGHT * np.abs(before))
 
 
-def _as_pair(old: State, found: Eigenpairs, i: int, index: IntArray, clear: BoolArray) -> tuple[int, int, int] | None:
+def _as_pair(
+    old: BranchState, found: Eigenpairs, i: int, index: IntArray, clear: BoolArray
+) -> tuple[int, int, int] | None:
     """Branch i matched together with its nearest: (j, place of i, place of j), None where they are no pair."""
     gap = np.abs(old.coordinate - old.coordinate[i])
     gap[i] = np.inf
@@ -283,7 +285,7 @@ def _as_pair(old: State, found: Eigenpairs, i: int, index: IntArray, clear: Bool
     return j, int(both[first]), int(both[1 - first])
 
 
-def _crossed(old: State, found: Eigenpairs, branches: tuple[int, int], both: IntArray) -> bool:
+def _crossed(old: BranchState, found: Eigenpairs, branches: tuple[int, int], both: IntArray) -> bool:
     """Whether two branches, of which the first would go to both[0], have exchanged their order instead: their
     difference then runs straight through zero, which its slopes at both ends say. Shapes do not: where friction couples
     two modes one way only, they are one shape there."""

@@ -12,7 +12,7 @@ import numpy as np
 from ...typing import Array, BoolArray, ComplexArray
 from ..dense_problem import OverNumber
 from ..tolerances import SPLIT_RELATIVE
-from .follow import COINCIDENT, State, halves
+from .follow import COINCIDENT, BranchState, halves
 from .undamped import COMPLEX, Squares, mirrored, on_axis, rounding, squared, squares_of, undamped
 
 TOUCHING = 0.05  # squared half differences that come down to this part of their ends are looked at closely
@@ -35,10 +35,10 @@ class Passage:
     partner: int
     stabilising: bool
     means: tuple[complex, complex]
-    old: State
+    old: BranchState
 
 
-def passages(source: OverNumber, old: State, new: State) -> list[Passage]:
+def passages(source: OverNumber, old: BranchState, new: BranchState) -> list[Passage]:
     """Changes of stability between two states: of modes that nothing damps where they meet or come to rest, whatever
     damps others, of these where they cross the axis."""
     if not source.damped:
@@ -48,7 +48,7 @@ def passages(source: OverNumber, old: State, new: State) -> list[Passage]:
     return met + [p for p in crossings(old, new) if not alone[p.branch]]
 
 
-def crossings(old: State, new: State) -> list[Passage]:
+def crossings(old: BranchState, new: BranchState) -> list[Passage]:
     """Zeros of the growth rates between two states, by the cubic through rates and slopes at both ends: it sees a mode
     that grows and decays again in between."""
     step = new.mu - old.mu
@@ -106,14 +106,14 @@ def _cubic(start: float, end: float, first: float, second: float, at: float) -> 
     return start + at * (first + at * (c2 + at * c3)) if 0 < at < 1 else (end if at else start)
 
 
-def _neighbour(state: State, i: int) -> int:
+def _neighbour(state: BranchState, i: int) -> int:
     """The branch nearest to branch i; itself where its own conjugate is nearer."""
     distance = np.abs(state.values - state.values[i])
     distance[i] = 2 * abs(state.values[i].imag)
     return int(np.argmin(distance))
 
 
-def meetings(source: OverNumber, old: State, new: State, among: BoolArray | None = None) -> list[Passage]:
+def meetings(source: OverNumber, old: BranchState, new: BranchState, among: BoolArray | None = None) -> list[Passage]:
     """Undamped modes that meet or part, or diverge, between two states; of the branches (b,) ``among`` alone where
     that is given, others being damped."""
     floor = COMPLEX * source.frequency**2

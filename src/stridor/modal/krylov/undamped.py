@@ -14,7 +14,7 @@ import numpy as np
 from ...typing import Array, BoolArray, ComplexArray
 from ..dense_problem import Eigenpairs, OverNumber
 from ..tolerances import SPLIT_RELATIVE, UNSTABLE_RELATIVE
-from .follow import State
+from .follow import BranchState
 
 COMPLEX = 1e-9  # imaginary part of λ² over the band's that is more than rounding
 MIRRORED = 1e-3  # of the growth of one: by how much the decay of the other may differ for the two to be undamped
@@ -24,7 +24,7 @@ MIRRORED = 1e-3  # of the growth of one: by how much the decay of the other may 
 class Squares:
     """Branches (b,) at one μ by λ²: coordinate (b,), tangents dλ²/dμ (b,), and the state they are of."""
 
-    state: State
+    state: BranchState
     coordinate: ComplexArray
     tangents: ComplexArray
 
@@ -41,7 +41,7 @@ def squares_of(source: OverNumber, found: Eigenpairs) -> tuple[ComplexArray, Com
     return found.values**2, 2 * found.values * found.tangents
 
 
-def squared(source: OverNumber, state: State) -> Squares:
+def squared(source: OverNumber, state: BranchState) -> Squares:
     """The branches of a state by λ²."""
     x, tangents = squares_of(source, state.found)
     return Squares(state, x[state.index], tangents[state.index])
@@ -59,7 +59,7 @@ def rounding(values: ComplexArray) -> Array:
     return np.maximum(UNSTABLE_RELATIVE * size, beside)
 
 
-def on_axis(source: OverNumber, state: State) -> BoolArray:
+def on_axis(source: OverNumber, state: BranchState) -> BoolArray:
     """Which branches (b,) neither grow nor decay beyond rounding, or are at rest but for it."""
     values = state.values
     result = np.abs(values.real) <= rounding(values)
@@ -74,13 +74,13 @@ def mirrored(one: complex, other: complex) -> bool:
     return abs(one + other.conjugate()) <= MIRRORED * abs(one.real)
 
 
-def _falls_apart(state: State, lam: complex) -> bool:
+def _falls_apart(state: BranchState, lam: complex) -> bool:
     """Whether a real eigenvalue λ has come with −λ out of rest."""
     real = state.found.values[state.found.values.imag == 0.0]
     return bool(np.any(np.abs(real + lam) <= MIRRORED * abs(lam)))
 
 
-def undamped(source: OverNumber, old: State, new: State) -> BoolArray:
+def undamped(source: OverNumber, old: BranchState, new: BranchState) -> BoolArray:
     """Which branches (b,) nothing damps, as far as two neighbouring states show: they are on the axis at both, or at
     one, and at the other mirrored in it by another that was there as well."""
     was, now = on_axis(source, old), on_axis(source, new)

@@ -12,7 +12,7 @@ import numpy as np
 from ...errors import AnalysisError
 from ...typing import Array, ComplexArray, IntArray
 from ..dense_problem import Eigenpairs, OverNumber, combined
-from ..krylov.follow import Follower, State
+from ..krylov.follow import BranchState, Follower
 from .dense import assembled_each, images
 from .model import ReducedModel, ReducedModes
 
@@ -105,7 +105,7 @@ def numbers_at(start: Numbered, end: ReducedModes) -> IntArray:
     if not len(known):
         return found
     line = ModelAlongLine(start, end)
-    follower = Follower.resumed(line, State(line.eigenpairs(0.0), known))
+    follower = Follower.resumed(line, BranchState(line.eigenpairs(0.0), known))
     with contextlib.suppress(AnalysisError):
         found[follower.advance(1.0).index] = start.numbers[known]
     return found

@@ -112,7 +112,7 @@ class HarmonicBranch:
         self.forget()
         return self.heading(point, along)
 
-    def settled(self, point: Balanced, heading: Array) -> tuple[Balanced, Array]:
+    def next_start(self, point: Balanced, heading: Array) -> tuple[Balanced, Array]:
         """The cycle with as many harmonics as its defect asks for, and its heading."""
         h, rows = point.harmonics, len(point.at.z)
         most = min(self.most, (MOST_UNKNOWN // rows - 1) // 2)

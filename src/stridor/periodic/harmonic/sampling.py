@@ -25,7 +25,7 @@ def sampled_series(cycle: Balanced, reached_from: str) -> Cycle:
     ways = _ways(cycle)
     normal, friction, slip, gap, _ = _at(cycle, 2 * np.pi * times / cycle.period, ways)
     fine = _at(cycle, phases, ways)
-    codes = np.stack([settled(row, at.base.harmonics) for row in fine[4]])
+    codes = np.stack([without_short(row, at.base.harmonics) for row in fine[4]])
     shares = np.stack([np.mean(codes == kind, axis=1) for kind in (OPEN, STICK)], axis=1)
     index = np.minimum((times / cycle.period * at.base.samples).astype(int), at.base.samples - 1)
     status = np.where(codes >= ALONG, SLIP, codes)[:, index]
@@ -71,7 +71,7 @@ def _at(cycle: Balanced, phases: Array, ways: Array) -> tuple[Array, Array, Arra
     return applied.normal, friction, slip, gap + family.nodes.gap[:, None], codes.astype(np.int64)
 
 
-def settled(codes: IntArray, harmonics: int) -> IntArray:
+def without_short(codes: IntArray, harmonics: int) -> IntArray:
     """Without what is too short to be told by so many harmonics: slip beside a stick that is long enough is stick, a
     stick goes half to what is before and half to behind, and slip amid slip the other way goes with that."""
     return _one_way(_without(_without(codes, harmonics, SLIP), harmonics, STICK), harmonics)

@@ -165,7 +165,7 @@ def _impulses(
 
 
 @dataclass(frozen=True)
-class State:
+class EventState:
     """Displacement q, velocity v (k,) and p (P,), and what the terms of q and v amount to."""
 
     q: Array
@@ -200,7 +200,7 @@ def consistent_status(
     count: int,
     touching: Mapping[int, Touching],
     driven: Callable[[Status], Driven],
-    state: State,
+    state: EventState,
 ) -> Status:
     """The status of ``count`` contacts whose forces and accelerations go with it, of those that touch; all others are
     open. Raises AnalysisError where there is none: friction jams."""
@@ -222,7 +222,7 @@ def consistent_status(
     )
 
 
-def _consistent(driven: Driven, touching: Mapping[int, Touching], state: State) -> bool:
+def _consistent(driven: Driven, touching: Mapping[int, Touching], state: EventState) -> bool:
     status, pairs, now_at = driven.regime.status, driven.regime.pairs, (state.q, state.v, state.p)
     forces = [(n.at(*now_at), t.at(*now_at)) for n, t in driven.forces]
     rounding = max(

@@ -58,7 +58,7 @@ LEVEL, EVENTS, UNSURE, CROWDED, PEAK_LEVEL, NEXT_KIND, NEXT_NUMBER, NEEDED, NEXT
 COUNTS = 11
 
 
-class State(NamedTuple):
+class LeapState(NamedTuple):
     """What moves on: q and v (2k,), where contacts began to stick (m,), works (5,) up to the beginning
     of the modes and up to now, statuses (m,), when each contact opened and from which status (m,)."""
 
@@ -76,7 +76,7 @@ class State(NamedTuple):
 
 @njit(cache=True)
 def _begin(
-    store: Array, where: IntArray, state: State, bench: Bench
+    store: Array, where: IntArray, state: LeapState, bench: Bench
 ) -> tuple[Array, Array, float]:  # pragma: no cover - compiled
     """Modes ζ (2, f) of a state, terms (J, S) of what is slow, and how long these may be used."""
     size, m = state.moving.shape[0], state.holds.shape[0]
@@ -112,7 +112,7 @@ def _begin(
 
 @njit(cache=True)
 def _look(
-    store: Array, where: IntArray, state: State, zeta: Array, terms: Array, ahead: Array
+    store: Array, where: IntArray, state: LeapState, zeta: Array, terms: Array, ahead: Array
 ) -> bool:  # pragma: no cover - compiled
     """Find what comes next; whether that can be told. Where it is a change of contact, modes there are ``ahead``."""
     times, counts = state.times, state.counts
@@ -147,7 +147,7 @@ def _look(
 
 
 @njit(cache=True)
-def _count(state: State, time: float, step: float) -> None:  # pragma: no cover - compiled
+def _count(state: LeapState, time: float, step: float) -> None:  # pragma: no cover - compiled
     """Time spent in the present statuses, in steps."""
     share = max(time - state.times[COUNTED], 0.0) / step
     for c in range(state.status.shape[0]):
@@ -163,7 +163,7 @@ def _count(state: State, time: float, step: float) -> None:  # pragma: no cover 
 @njit(cache=True)
 def leap(
     store: Array, legs_at: IntArray, legs: IntArray, options_at: IntArray, options: IntArray, bench: Bench,
-    state: State, zeta: Array, terms: Array, ahead: Array, records: Records, end: float, step: float, every: int,
+    state: LeapState, zeta: Array, terms: Array, ahead: Array, records: Records, end: float, step: float, every: int,
     last: int, fastest: float, plain: int,
 ) -> tuple[int, Array, Array, Array]:  # fmt: skip # pragma: no cover - compiled
     """Up to ``end`` [s], with records before step ``last``; what ended it, ζ (2, f) and terms (J, S) of the modes, and

@@ -36,7 +36,7 @@ from .leap import (
     SPAN,
     TIMES,
     UNSURE,
-    State,
+    LeapState,
     leap,
 )
 from .motion import UNTOLD, Anchor, Motion, Watched
@@ -100,7 +100,7 @@ class Leaps:
 
     # -- state -------------------------------------------------------------------------------------------------------
 
-    def _state(self, motion: Motion) -> tuple[State, Array, Array, Array]:
+    def _state(self, motion: Motion) -> tuple[LeapState, Array, Array, Array]:
         times, counts = np.zeros(TIMES), np.zeros(COUNTS, dtype=np.int64)
         zeta, terms, ahead = np.zeros((2, 0)), np.zeros((1, 0)), np.zeros(0)
         times[[NOW, CROWD_SINCE, LATEST, COUNTED]] = motion.time, motion.crowd_since, motion.latest, self.counted
@@ -113,14 +113,14 @@ class Leaps:
             times[[NEXT, SPAN]] = motion.next[0], motion.anchor.span
             zeta, terms, ahead = planes(motion.anchor.zeta), motion.anchor.terms, self._modes_ahead
         works = motion.works.copy()
-        state = State(
+        state = LeapState(
             np.concatenate([motion.q, motion.v]), motion.holds.copy(), works, works.copy(),
             np.array(motion.status, dtype=np.int64), motion.parted.copy(), motion.parted_from.copy(), times, counts,
             self.statistics,
         )  # fmt: skip
         return state, zeta, terms, ahead
 
-    def _take(self, motion: Motion, state: State, zeta: Array, terms: Array, ahead: Array) -> None:
+    def _take(self, motion: Motion, state: LeapState, zeta: Array, terms: Array, ahead: Array) -> None:
         k, times, counts = motion.basis.size, state.times, state.counts
         motion.q, motion.v = state.moving[:k], state.moving[k:]
         motion.holds, motion.works = state.holds, state.works

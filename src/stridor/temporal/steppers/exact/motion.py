@@ -11,7 +11,7 @@ from ....errors import AnalysisError
 from ....typing import Array, ComplexArray, IntArray
 from ...columns import FRICTION, NORMAL, SUPPORT, WORKS
 from ..basis import Basis
-from .decisions import CLOSE, Impact, State, Touching, choices, consistent_status, impact, landing
+from .decisions import CLOSE, EventState, Impact, Touching, choices, consistent_status, impact, landing
 from .drive import Piece
 from .leap import MOMENT, PLAIN, STRETCH
 from .search import CROSSED, UNDECIDED, Numbers, Parts, first_root, numbers_of, parts_of, planes
@@ -121,8 +121,8 @@ class Motion:
         """p: powers of time, and where contacts began to stick."""
         return np.concatenate([self.pieces[self.piece].powers(time), self.holds])
 
-    def _state(self) -> State:
-        return State(self.q, self.v, self.drive(self.time), *self._sizes)
+    def _state(self) -> EventState:
+        return EventState(self.q, self.v, self.drive(self.time), *self._sizes)
 
     def support_speeds(self) -> tuple[Array, Array]:
         """What moving supports add to the velocities (m,) along normals and tangents now."""

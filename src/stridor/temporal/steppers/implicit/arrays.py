@@ -52,7 +52,7 @@ class Nodes(NamedTuple):
     kept: IntArray
 
 
-class State(NamedTuple):
+class StepState(NamedTuple):
     """What moves on. q, v (r,): displacement and velocity; before (r,): v a step before. place (m,) [m], speed (m d,)
     [m/s]: gap and velocities of the nodes by the structure; impulse, earlier (m d,) [N s]: of the last step and the one
     before it; status (m,). works (5,) [J], statistics (c, 8), counters (6,), motion (2, p): way and rate of the

@@ -13,7 +13,7 @@ from ...columns import STATISTICS
 from ...phase_results import fresh_statistics
 from ..basis import Basis
 from ..sparse.node_table import sliding_directions
-from .arrays import COUNTERS, Nodes, State, Structure, Work
+from .arrays import COUNTERS, Nodes, StepState, Structure, Work
 from .warp import warped
 
 COUPLED = 1e-9  # of the damping: what beside the diagonal counts
@@ -68,10 +68,10 @@ def nodes_of(
     )
 
 
-def fresh_state(nodes: Nodes, structure: Structure, contacts: int) -> State:
+def fresh_state(nodes: Nodes, structure: Structure, contacts: int) -> StepState:
     """Nothing moves yet."""
     m, total, r, p = len(nodes.gap), len(nodes.row), len(structure.mass), len(structure.inertia)
-    return State(
+    return StepState(
         q=np.zeros(r), v=np.zeros(r), before=np.zeros(r), place=np.zeros(m), speed=np.zeros(total),
         impulse=np.zeros(total), earlier=np.zeros(total), status=np.zeros(m, dtype=np.int64), works=np.zeros(5),
         statistics=fresh_statistics(contacts, STATISTICS), counters=np.zeros(COUNTERS, dtype=np.int64),

@@ -35,7 +35,7 @@ from ...columns import (
     STICK_STEPS,
     SUPPORT,
 )
-from .arrays import BY_NEWTON, DONE, KEPT, MOST_SWEEPS, NODES_KEPT, Nodes, Record, State, Structure, Work
+from .arrays import BY_NEWTON, DONE, KEPT, MOST_SWEEPS, NODES_KEPT, Nodes, Record, StepState, Structure, Work
 from .node_law import SWEEP_LIMIT, solve_nodes, total_of
 
 # Steps after which gaps and velocities of the nodes are read off the structure again. From step to step they are
@@ -65,7 +65,7 @@ def _drag(a: Structure, v: Array, i: int) -> float:  # pragma: no cover - compil
 
 
 @njit(cache=True)
-def _free(loads: Array, rate: Array, a: Structure, state: State, work: Work) -> None:  # pragma: no cover - compiled
+def _free(loads: Array, rate: Array, a: Structure, state: StepState, work: Work) -> None:  # pragma: no cover - compiled
     """What v changes by over the step without contact, into work.change; forces of loads and supports into force."""
     h, r = a.step, len(state.q)
     for i in range(r):
@@ -92,7 +92,7 @@ def _free(loads: Array, rate: Array, a: Structure, state: State, work: Work) -> 
 
 
 @njit(cache=True)
-def _seen(increment: Array, rate: Array, a: Structure, nodes: Nodes, state: State, work: Work) -> None:
+def _seen(increment: Array, rate: Array, a: Structure, nodes: Nodes, state: StepState, work: Work) -> None:
     # pragma: no cover - compiled
     """What the laws of the nodes see without impulses, into work.free; velocities at the start into work.slip."""
     h, d = a.step, work.local.shape[1]
@@ -122,7 +122,7 @@ def _seen(increment: Array, rate: Array, a: Structure, nodes: Nodes, state: Stat
 
 @njit(cache=True)
 def free_of_contact(
-    loads: Array, increment: Array, rate: Array, a: Structure, nodes: Nodes, state: State, work: Work
+    loads: Array, increment: Array, rate: Array, a: Structure, nodes: Nodes, state: StepState, work: Work
 ) -> None:  # pragma: no cover - compiled
     """The step from here without contact: work.change of v, and what the nodes see of it."""
     _free(loads, rate, a, state, work)
@@ -131,7 +131,7 @@ def free_of_contact(
 
 
 @njit(cache=True)
-def _statistics(a: Structure, nodes: Nodes, state: State, work: Work) -> None:  # pragma: no cover - compiled
+def _statistics(a: Structure, nodes: Nodes, state: StepState, work: Work) -> None:  # pragma: no cover - compiled
     """Status and forces of the step into the statistics; sums (c, 6): N, T, status, slip speed at most, Σ|N|."""
     d, sums = work.local.shape[1], work.sums
     sums[:] = 0.0
@@ -167,7 +167,7 @@ def _statistics(a: Structure, nodes: Nodes, state: State, work: Work) -> None:  
 
 
 @njit(cache=True)
-def _energies(a: Structure, state: State, row: Array) -> None:  # pragma: no cover - compiled
+def _energies(a: Structure, state: StepState, row: Array) -> None:  # pragma: no cover - compiled
     """Kinetic and elastic energy of the scheme at t_n, and the works up to there."""
     kinetic = elastic = 0.0
     for i in range(len(state.q)):
@@ -186,7 +186,7 @@ def _energies(a: Structure, state: State, row: Array) -> None:  # pragma: no cov
 
 
 @njit(cache=True)
-def _record_nodes(a: Structure, nodes: Nodes, state: State, work: Work, record: Record) -> None:
+def _record_nodes(a: Structure, nodes: Nodes, state: StepState, work: Work, record: Record) -> None:
     # pragma: no cover - compiled
     """Contacts at t_n: forces are means over the steps before and after, status that of the step after."""
     d, at_record = work.local.shape[1], state.counters[KEPT]
@@ -231,7 +231,7 @@ def _record_nodes(a: Structure, nodes: Nodes, state: State, work: Work, record: 
 
 
 @njit(cache=True)
-def _record(rate: Array, a: Structure, nodes: Nodes, state: State, work: Work, record: Record) -> None:
+def _record(rate: Array, a: Structure, nodes: Nodes, state: StepState, work: Work, record: Record) -> None:
     # pragma: no cover - compiled
     """t_n with what the step from there has shown; work.change is then what v changes by over it."""
     at, first = state.counters[KEPT], state.counters[DONE] == 0
@@ -255,7 +255,7 @@ def _record(rate: Array, a: Structure, nodes: Nodes, state: State, work: Work, r
 
 @njit(cache=True)
 def _finish(
-    loads: Array, increment: Array, rate: Array, a: Structure, nodes: Nodes, state: State, work: Work
+    loads: Array, increment: Array, rate: Array, a: Structure, nodes: Nodes, state: StepState, work: Work
 ) -> None:  # pragma: no cover - compiled
     """The step itself, and its works; work.change is what v changes by."""
     h, r, d, motions = a.step, len(state.q), work.local.shape[1], len(rate)
@@ -308,7 +308,7 @@ def _finish(
 
 
 @njit(cache=True)
-def _move_nodes(rate: Array, a: Structure, nodes: Nodes, state: State, work: Work) -> None:
+def _move_nodes(rate: Array, a: Structure, nodes: Nodes, state: StepState, work: Work) -> None:
     # pragma: no cover - compiled
     """Velocities behind the step into work.total, of structure and supports; the nodes' own state follows."""
     d = work.local.shape[1]
@@ -325,7 +325,7 @@ def _move_nodes(rate: Array, a: Structure, nodes: Nodes, state: State, work: Wor
 
 
 @njit(cache=True)
-def _renew(nodes: Nodes, state: State, d: int) -> None:  # pragma: no cover - compiled
+def _renew(nodes: Nodes, state: StepState, d: int) -> None:  # pragma: no cover - compiled
     """Gaps and velocities of the nodes as the structure has them."""
     for i in range(len(nodes.gap)):
         state.place[i] = _dot(nodes.row[i * d], state.q)
@@ -335,8 +335,8 @@ def _renew(nodes: Nodes, state: State, d: int) -> None:  # pragma: no cover - co
 
 @njit(cache=True)
 def run_steps(
-    steps: int, given: bool, loads: Array, increments: Array, rates: Array, a: Structure, nodes: Nodes, state: State,
-    work: Work, record: Record,
+    steps: int, given: bool, loads: Array, increments: Array, rates: Array, a: Structure, nodes: Nodes,
+    state: StepState, work: Work, record: Record,
 ) -> tuple[int, int]:  # pragma: no cover - compiled
     """Up to ``steps`` steps; how many were done and why it ended: FINISHED, NOT_FINITE, or HARD where Gauss–Seidel does
     not settle. given: whether work.impulse has the impulses of the first step, with work.status."""

@@ -12,14 +12,14 @@ import numpy as np
 from ....contact.multipliers import SLIP, STICK
 from ....laws.packed import coefficient_at
 from ....typing import Array
-from .arrays import Nodes, State, Work
+from .arrays import Nodes, StepState, Work
 from .node_law import spring_force
 
 ITERATIONS = 40
 CLOSE = 1e-12  # of the largest impulse
 
 
-def newton(step: float, nodes: Nodes, state: State, work: Work) -> None:
+def newton(step: float, nodes: Nodes, state: StepState, work: Work) -> None:
     """Impulses into work.impulse; those that leave the least residual, where it does not converge."""
     impulse = work.impulse.copy()
     best, least = impulse, np.inf
@@ -39,7 +39,7 @@ def newton(step: float, nodes: Nodes, state: State, work: Work) -> None:
     work.impulse[:] = best
 
 
-def _linearised(step: float, nodes: Nodes, state: State, work: Work, impulse: Array) -> tuple[Array, Array]:
+def _linearised(step: float, nodes: Nodes, state: StepState, work: Work, impulse: Array) -> tuple[Array, Array]:
     """P less its projection (m d,), and the slope of that (m d, m d)."""
     d, operator = work.local.shape[1], nodes.delassus
     total = work.free + operator @ impulse

@@ -21,7 +21,7 @@ from ....kernels import njit
 from ....laws import packed
 from ....typing import Array
 from ..sparse.disc import solve_disc
-from .arrays import Nodes, State, Work
+from .arrays import Nodes, StepState, Work
 
 _OPEN, _STICK, _SLIP = multipliers.OPEN, multipliers.STICK, multipliers.SLIP
 _KIND, _CONSTANT = packed.KIND, packed.CONSTANT
@@ -111,7 +111,7 @@ def _solve(
 
 
 @njit(cache=True, allocates=False)
-def _relax(i: int, h: float, nodes: Nodes, state: State, work: Work) -> int:  # pragma: no cover - compiled
+def _relax(i: int, h: float, nodes: Nodes, state: StepState, work: Work) -> int:  # pragma: no cover - compiled
     """Impulses of node i with those of all others as they are into work.local[0]; its status."""
     d = work.local.shape[1]
     at, w = i * d, nodes.delassus
@@ -206,7 +206,7 @@ def _pack(count: int, d: int, nodes: Nodes, work: Work) -> None:  # pragma: no c
 
 @njit(cache=True, allocates=False)
 def _sweeps(
-    count: int, limit: int, h: float, nodes: Nodes, state: State, work: Work
+    count: int, limit: int, h: float, nodes: Nodes, state: StepState, work: Work
 ) -> tuple[bool, int]:  # pragma: no cover - compiled
     """Up to so many sweeps over the chosen nodes: whether they settled, and how many were done."""
     d, new = work.local.shape[1], work.local[0]
@@ -244,7 +244,7 @@ def _sweeps(
 
 
 @njit(cache=True, allocates=False)
-def solve_nodes(limit: int, h: float, nodes: Nodes, state: State, work: Work) -> int:  # pragma: no cover - compiled
+def solve_nodes(limit: int, h: float, nodes: Nodes, state: StepState, work: Work) -> int:  # pragma: no cover - compiled
     """Impulses into work.impulse, from those that are there; sweeps done, limit + 1 where they did not settle.
 
     Nodes that touch or would are swept alone; those that their impulses close join in.

@@ -26,7 +26,7 @@ from ...trajectory import Trajectory
 from ..coordinates import COMPLETE, Coordinates, coordinates, pushed_at, rows_of
 from ..sparse.stepper import with_friction
 from ..starting import OVERLAP
-from .arrays import BY_NEWTON, DONE, KEPT, MOST_SWEEPS, NODES_KEPT, UNCONVERGED, Nodes, Record, State, Structure
+from .arrays import BY_NEWTON, DONE, KEPT, MOST_SWEEPS, NODES_KEPT, UNCONVERGED, Nodes, Record, StepState, Structure
 from .build import fresh_state, nodes_of, structure_of, work_space
 from .loop import HARD, NOT_FINITE, run_steps
 from .newton import newton
@@ -124,7 +124,7 @@ class ImplicitStepper:
         self.left_out = 0.0  # of the initial displacement or velocity, by mass
         self.contact_names, self.closed = nodes.names, nodes.closed
         self.parts = sketch(system, nodes)
-        self.moving: State = fresh_state(self.nodes, self.structure, len(nodes.names))
+        self.moving: StepState = fresh_state(self.nodes, self.structure, len(nodes.names))
         self.work = work_space(self.nodes, self.structure, len(nodes.names), nodes.directions)
 
     @property
