@@ -82,3 +82,5 @@ def test_figures_of_an_earlier_result_go(tmp_path: Path):
     ended = stridor("cycles", "case.toml", "--mu", "0", cwd=tmp_path)
     assert not any(figure.exists() for figure in figures)
     assert ended.stderr.count("of an earlier result") == 2
+    # Neither what was found nor that nothing was: whatever a search finds, there may be more.
+    assert "such as loud ones apart from every onset, are not among them" in " ".join(ended.stdout.split())

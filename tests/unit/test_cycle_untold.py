@@ -35,3 +35,9 @@ def test_no_stick_by_harmonics_is_none_that_they_tell(method, harmonics, stick, 
     assert one.untold_share == share
     found = Cycles((one,), (), (), None)
     assert found.sentence.split("stable", 1)[1] == said
+
+
+def test_which_cycles_are_not_found_is_said_whatever_was() -> None:
+    nothing = Cycles((), (), (), (0.1, 0.5))
+    assert nothing.to_json()["reach"] == nothing.reach
+    assert nothing.reach in nothing._repr_html_()

@@ -105,7 +105,7 @@ def cycles(
         call.document(result.to_json() | {"files": [str(f) for f in files]})
     else:
         _show(result)
-        for line in (*result.missing, *result.notes):
+        for line in (*result.missing, *result.notes, result.reach):
             stdout.print(line)
         call.conclude(_conclusion(result))
     if result.interrupted:

@@ -29,6 +29,10 @@ UNITS = {
     "velocity": "m/s", "acceleration": "m/s²", "slip_range": "m/s", "force_range": "N", "period": "s",
 }  # fmt: skip
 POOR = 1e-2  # a defect that is said
+REACH = (
+    "Cycles to which no onset, no branch and no push or run above leads, such as loud ones apart from every onset, are "
+    "not among them."
+)
 NUMBERS = ("mu", "period", "residual", "grazed", "defect", "own_off")
 
 
@@ -82,6 +86,11 @@ class Cycles(Tabular):
         return f"{counted(len(self.cycles), 'limit cycle')} at {over}: {', '.join(said)}{on}{self._untold}"
 
     @property
+    def reach(self) -> str:
+        """What a search from onsets, pushes and runs does not find, whatever it has found."""
+        return REACH
+
+    @property
     def _untold(self) -> str:
         """Which sticks may be there though no stick is listed; "" of shooting, and where all contacts stick."""
         shares = [c.untold_share for c in self.cycles if c.untold_share and not np.all(c.shares[:, 1] > 0.0)]
@@ -127,7 +136,7 @@ class Cycles(Tabular):
             for c in self.cycles
         ]
         heads = ("μ", "frequency", "stable", "largest multiplier", "with")
-        return html_table("Limit cycles", heads, rows, (self.sentence, *self.missing))
+        return html_table("Limit cycles", heads, rows, (self.sentence, *self.missing, self.reach))
 
     def table(self) -> Rows:
         """Heads and rows, as its CSV file has them: a row for each cycle and contact."""
@@ -158,6 +167,7 @@ class Cycles(Tabular):
             "branches": [b.to_json() for b in self.branches],
             "onsets": [dict(vars(o)) for o in self.onsets],
             "missing": list(self.missing),
+            "reach": self.reach,
             "unclosed": [u.to_json() for u in self.unclosed],
             "notes": list(self.notes),
             "warnings": list(self.warnings),

@@ -200,7 +200,7 @@ def _cycles(inputs: ReportInputs) -> Chapter:
     parts = (*cycle_figures(inputs), *(() if table is None else (table,)))
     # Ends of branches are told with these.
     missing = [line for line in result.missing if not line.startswith("branch ")]
-    lines = (*branch_words(result), *missing, *result.notes)
+    lines = (*branch_words(result), *missing, *result.notes, result.reach)
     return Chapter("limit-cycles", "Limit cycles", cycle_words(result), lines, parts)
 
 
