@@ -170,6 +170,15 @@ def test_a_note_where_other_nodes_touch_at_another_friction(tmp_path: Path) -> N
     assert np.array_equal(load, st.build_system(case).loads["press"])
 
 
+def test_a_note_where_contacts_kept_closed_pull_at_another_friction(tmp_path: Path) -> None:
+    case = st.loads(rubbing_block("max_frequency_hz = 30e3\nfriction_range = [0.0, 0.3]")).with_({
+        "bodies.block.mesh.divisions": [3, 5], "bodies.slider.mesh.divisions": [6, 1], "contacts.face.closed": True,
+        "contacts.face.friction.coefficient": 0.1,
+    })  # fmt: skip
+    (note,) = st.export(case, tmp_path).notes
+    assert "kept closed has turned from pushing to pulling or back" in note
+
+
 def test_a_second_export_replaces_the_first_only_if_asked(tmp_path: Path) -> None:
     assert stridor("new", "two-beams", "--quiet", cwd=tmp_path).returncode == 0
     words = ("export", "two-beams.toml", "--quiet", *SET_FEW)

@@ -754,12 +754,18 @@ def test_where_there_is_no_steady_sliding_it_is_said_from_where_on(monkeypatch) 
 
 def test_nothing_is_looked_at_where_nothing_can_change(monkeypatch) -> None:
     whole = (Stretch(0.1, 0.5, None),)
-    for changes in ({"loads": {}}, {"load_steps": (1,)}, {"contact_nodes": lambda: SimpleNamespace(count=0)},
-                    {"contact_nodes": lambda: SimpleNamespace(count=2, kept=np.ones(2, dtype=bool))}):  # fmt: skip
+    for changes in ({"loads": {}}, {"load_steps": (1,)}, {"contact_nodes": lambda: SimpleNamespace(count=0)}):
         system, asked = model(monkeypatch, LINES)
         vars(system).update(changes)
         assert stretches.stretches(system, 0.1, 0.5) == whole
         assert asked == []
+
+
+def test_contacts_kept_closed_are_looked_at_as_they_may_turn_from_pushing_to_pulling(monkeypatch) -> None:
+    system, asked = model(monkeypatch, LINES)
+    vars(system).update(contact_nodes=lambda: SimpleNamespace(count=2, kept=np.ones(2, dtype=bool)))
+    assert len(stretches.stretches(system, 0.1, 0.5)) > 1
+    assert asked
 
 
 def test_a_distance_alone_presses_as_a_load_does(monkeypatch) -> None:

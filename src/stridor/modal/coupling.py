@@ -85,7 +85,7 @@ class PointCoupling:
     def _forces(self, mu: float) -> tuple[Array, Array]:
         """|N| (m,) and its derivative in μ."""
         steady = steady_sliding(self.system, mu=mu)
-        sign = np.where(steady.normal_force < 0.0, -1.0, 1.0)
+        sign = np.where(steady.pulls, -1.0, 1.0)
         return sign * steady.normal_force, sign * force_rates(self.system, steady)
 
     def matrices(
@@ -161,7 +161,7 @@ def couple(system: System, *, mu: float | None = None) -> tuple[PointCoupling, t
         open_names = tuple(c.name for c, a in zip(system.contacts, closed, strict=True) if not a)
         touching = tuple(c for c, a in zip(system.contacts, closed, strict=True) if a)
         system = replace(system, contacts=touching)
-        pulls = steady.normal_force[closed] < 0.0
+        pulls = steady.pulls[closed]
     else:
         pulls = np.zeros(len(system.contacts), dtype=bool)
     speeds = slip_speeds(system, velocities)

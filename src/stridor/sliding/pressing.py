@@ -6,14 +6,22 @@ import numpy as np
 
 from ..errors import AnalysisError
 from ..system import System
-from ..typing import Array
+from ..typing import Array, BoolArray
 
+PULLS = 1e-12  # of the largest contact force: a pull that is no more is rounding
 NOTHING = 1e-9  # of all loads together, each by itself: what their sum leaves as rounding
 
 
 def least_force(system: System) -> float:
     """The force [N] below which a contact's normal force is rounding: a part of all loads, cancelling or not."""
     return NOTHING * sum(float(np.abs(vector).sum()) for vector in system.loads.values())
+
+
+def pulled(normal_force: Array) -> BoolArray:
+    """Which nodes (m,) pull, of normal forces [N] in compression: only those of contacts kept closed can. Friction,
+    μ|N| against the slip, goes with −N there."""
+    pulls: BoolArray = normal_force < -PULLS * float(np.abs(normal_force).max(initial=0.0))
+    return pulls
 
 
 def anything_acts(system: System) -> bool:

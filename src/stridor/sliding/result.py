@@ -11,6 +11,7 @@ from ..contact.multipliers import SLIP, STICK
 from ..digits import readable
 from ..notebook import Shown, counted, html_table
 from ..typing import Array, BoolArray, IntArray
+from .pressing import pulled
 from .resultants import Balance, Resultant
 
 
@@ -92,6 +93,11 @@ class SteadySliding(Shown):
             for name, r in self.resultants.items()
         ]  # fmt: skip
         return html_table(f"Steady sliding: {self._line}", heads, rows, self.warnings)
+
+    @property
+    def pulls(self) -> BoolArray:
+        """Nodes (m,) of contacts kept closed that pull; friction goes with −N there."""
+        return self.active & pulled(self.normal_force)
 
     @property
     def slip_speed(self) -> Array:

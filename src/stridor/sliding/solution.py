@@ -24,6 +24,7 @@ from .equilibrium import ContactRows, Equilibrium, NodeEquilibrium, find_touchin
 from .history import STILL, follow
 from .motions import external_force, full_motion, words_of_friction
 from .pattern import left_by_facets, unexplained_patterns
+from .pressing import pulled
 from .redundant import closed, nearly_one, redundant
 from .result import OtherEquilibrium, SteadySliding
 from .resultants import balance, resultants
@@ -192,7 +193,7 @@ def _with_friction(
 
 def _signs(nodes: ContactNodes, state: NodeEquilibrium) -> Array:
     """Of μ (m,): against the slip where nodes push, with it where those kept closed pull."""
-    return np.where(nodes.kept & (state.normal_force < 0.0), -1.0, 1.0)
+    return np.where(nodes.kept & pulled(state.normal_force), -1.0, 1.0)
 
 
 def other_equilibria(system: System, found: SteadySliding, mu: float | None = None) -> list[OtherEquilibrium]:

@@ -35,12 +35,12 @@ EQUAL = 12  # of them
 
 @dataclass(frozen=True)
 class Stretch:
-    """Friction coefficients from low to high at which the same nodes touch.
+    """Friction coefficients from low to high at which the same nodes touch, and the same of those kept closed pull.
 
     at: a μ whose steady sliding has them, None where they are those of the case's own friction. touching: how many of
-    ``nodes`` they are. reason: why there is no steady sliding, "" where there is. others: how many nodes are others at
-    one end or the other, of stretches that were cut where nothing changes; 0 of all that are exact. several: the μ
-    that were looked at where other nodes may touch as well.
+    ``nodes`` they are; pulling: how many of these pull. reason: why there is no steady sliding, "" where there is.
+    others: how many nodes are others at one end or the other, of stretches that were cut where nothing changes; 0 of
+    all that are exact. several: the μ that were looked at where other nodes may touch as well.
     """
 
     low: float
@@ -51,6 +51,7 @@ class Stretch:
     reason: str = ""
     others: int = 0
     several: tuple[float, ...] = ()
+    pulling: int = 0
 
     def of(self, system: System) -> System:
         """The system whose modes hold these nodes."""
@@ -73,12 +74,12 @@ def stretches(
     """The stretches that make up the friction coefficients from ``low`` to ``high``, in order. at (k,): μ between them
     whose own nodes have to be right; they are looked at whatever the others show, up to LOOKS of them.
 
-    One, without a look, where nothing can change: nothing acts, every contact kept closed, or contacts that may stick,
-    whose state is held (`System.load_steps`). A set that comes and goes between two looks that agree is not seen. Where
+    One, without a look, where nothing can change: nothing acts, or contacts may stick, whose state is held
+    (`System.load_steps`). A set that comes and goes between two looks that agree is not seen. Where
     more than MOST nodes open or close, the range is cut into EQUAL parts, each with the nodes of its middle.
     """
     nodes = system.contact_nodes()
-    if not nodes.count or not anything_acts(system) or system.load_steps or bool(np.all(nodes.kept)):
+    if not nodes.count or not anything_acts(system) or system.load_steps:
         return (Stretch(low, high, None),)
     search = _Equilibria(system, solver)
     own = search.own()
@@ -98,7 +99,7 @@ def stretches_along(
     that of the case as it is. ``Stretch.at`` is a value of this number, and every contact has its own friction; rubs:
     the number is the friction of all contacts, and something else too."""
     nodes = own.contact_nodes()
-    if not nodes.count or not anything_acts(own) or own.load_steps or bool(np.all(nodes.kept)):
+    if not nodes.count or not anything_acts(own) or own.load_steps:
         return (Stretch(low, high, None),)
     search = _Along(own, system_at, max(abs(low), abs(high)), solver, rubs=rubs)
     looks = [search.at(float(value)) for value in np.linspace(low, high, LOOKS if own.size <= SMALL else FEWER)]
@@ -126,6 +127,7 @@ def _between(search: _Equilibria, looks: Sequence[_Look], own: bytes | None) -> 
         Stretch(
             a, b, None if piece.key == own else search.inside(a, b, piece),
             0 if piece.found is None else int(piece.found.active.sum()), count, piece.reason,
+            pulling=0 if piece.found is None else int(piece.found.pulls.sum()),
             several=tuple(mu for mu in several if a <= mu <= b and not piece.reason),
         )
         for (a, b), piece in zip(pairwise(ends), pieces, strict=True)
@@ -148,7 +150,8 @@ def _equal(search: _Equilibria, low: float, high: float, count: int) -> tuple[St
         middle, ends = search.at(0.5 * (a + b)), (search.at(a), search.at(b))
         touching = 0 if middle.found is None else int(middle.found.active.sum())
         others = max(_different(middle, end) for end in ends)
-        result.append(Stretch(a, b, middle.mu, touching, count, middle.reason, others))
+        pulling = 0 if middle.found is None else int(middle.found.pulls.sum())
+        result.append(Stretch(a, b, middle.mu, touching, count, middle.reason, others, pulling=pulling))
     return tuple(result)
 
 
@@ -167,9 +170,11 @@ def stretch_words(found: tuple[Stretch, ...], name: str = "μ") -> tuple[str, ..
             "or a smaller range."
         )
     elif len(solid) > 1:
-        parts = [f"{s.touching} between {name} = {s.low:.6g} and {s.high:.6g}" for s in solid]
+        alike = any(s.pulling for s in solid) and len({s.touching for s in solid}) == 1
+        verb = "pull, of those kept closed," if alike else "touch"
+        parts = [f"{_counts(s, alike)} between {name} = {s.low:.6g} and {s.high:.6g}" for s in solid]
         told.append(
-            f"Of the {solid[0].nodes} contact nodes other ones touch in steady sliding {as_grows}: "
+            f"Of the {solid[0].nodes} contact nodes other ones {verb} in steady sliding {as_grows}: "
             f"{', '.join(parts)}. Each {one} is solved with those of its stretch."
         )
     if several := sorted({mu for s in solid for mu in s.several}):
@@ -182,6 +187,17 @@ def stretch_words(found: tuple[Stretch, ...], name: str = "μ") -> tuple[str, ..
     # Where one equilibrium jumps to another there may be none at that μ alone.
     told += [f"Between {name} = {low} and {high} nothing was solved: {why}." for low, high, why in none if low != high]
     return tuple(told)
+
+
+def _touch(stretch: Stretch) -> str:
+    return f"{stretch.touching} touch" + (f", {stretch.pulling} of them pull" if stretch.pulling else "")
+
+
+def _counts(stretch: Stretch, alike: bool) -> str:
+    """How many touch, and pull, in a stretch; alike: as many touch in all of them."""
+    if alike:
+        return f"{stretch.pulling}"
+    return f"{stretch.touching} ({stretch.pulling} of them pull)" if stretch.pulling else f"{stretch.touching}"
 
 
 def instead_of_own(system: System, low: float, high: float, *, solver: str | None = None) -> float | None:
@@ -204,7 +220,7 @@ def elsewhere_words(found: tuple[Stretch, ...], name: str = "μ") -> tuple[str, 
     own = next((s for s in found if s not in others), None)
     held = "The nodes" if own is None else f"The {own.touching} of {own.nodes} contact nodes"
     where = ", ".join(
-        f"{s.low:.4g} to {s.high:.4g} ({'no steady sliding' if s.reason else f'{s.touching} touch'})" for s in others
+        f"{s.low:.4g} to {s.high:.4g} ({'no steady sliding' if s.reason else _touch(s)})" for s in others
     )
     own_value = "at the case's own friction" if name == "μ" else "in the case as it is"
     at_every = HELD if name == "μ" else HELD_AT_ALL
@@ -382,16 +398,16 @@ def _probes(
 
 
 def _different(one: _Look, other: _Look) -> int:
-    """How many nodes touch at one of two μ alone; none are counted where there is no steady sliding at either."""
+    """How many nodes touch, or pull, at one of two μ alone; none where there is no steady sliding at either."""
     if one.found is None or other.found is None:
         return 0
-    return int(np.count_nonzero(one.found.active != other.found.active))
+    changed: BoolArray = (one.found.active != other.found.active) | (one.found.pulls != other.found.pulls)
+    return int(np.count_nonzero(changed))
 
 
 def _key(found: SteadySliding) -> bytes:
     """What modes hold of steady sliding: who touches, and which way friction goes where a kept contact pulls."""
-    pulls = found.active & (found.normal_force < 0.0)
-    return np.concatenate([found.active, pulls]).tobytes()
+    return np.concatenate([found.active, found.pulls]).tobytes()
 
 
 def _margin(found: SteadySliding) -> Array:

@@ -191,15 +191,27 @@ def _other_nodes(work: Workspace, system: System, contact: ContactProblem) -> tu
         return ()
     for mu in work.modal.friction_range:
         try:
-            touching = problem_of(system, mu, work.options).touching
+            there = problem_of(system, mu, work.options)
         except AnalysisError as error:
             return (f"at mu = {mu:g} there is no steady sliding ({error}); Kc and Kf are those at the case's own mu",)
-        if not np.array_equal(touching, contact.touching):
+        if not np.array_equal(there.touching, contact.touching):
             return (
-                f"other contact nodes touch at mu = {mu:g} ({len(touching)}) than at the case's own "
+                f"other contact nodes touch at mu = {mu:g} ({len(there.touching)}) than at the case's own "
                 f"({len(contact.touching)}), which Kc and Kf are made of",
             )
+        if turned := _turned(contact.slide, there.slide):
+            which = "1 contact node kept closed has" if turned == 1 else f"{turned} contact nodes kept closed have"
+            return (
+                f"at mu = {mu:g} {which} turned from pushing to pulling or back, and friction goes the other way: "
+                "Kf has the signs of the case's own mu",
+            )
     return ()
+
+
+def _turned(one: Sparse, other: Sparse) -> int:
+    """How many rows (m, n) have the opposite sign in the other matrix."""
+    along = np.asarray(sp.csr_array(one * other).sum(axis=1)).ravel()
+    return int(np.count_nonzero(along < 0.0))
 
 
 def _tangent(system: System, contact: ContactProblem) -> Sparse:
