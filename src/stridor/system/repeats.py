@@ -110,14 +110,19 @@ class Repeat:
         first = first - (first @ axis) * axis
         first /= np.linalg.norm(first)
         x, y = arm @ first, arm @ np.cross(axis, first)
-        angle = np.arctan2(y, x) / math.radians(self.rotation.angle_deg)
+        angle = np.arctan2(y, x) / math.radians(self.step_deg)
         size = np.hypot(x, y)
         return np.where(size > ALIKE * np.abs(arm).max(initial=0.0), angle, np.nan)
 
     @property
     def around(self) -> float:
         """Sectors of a whole turn, infinite of a translation."""
-        return math.inf if self.rotation is None else 360.0 / abs(self.rotation.angle_deg)
+        return math.inf if self.rotation is None else 360.0 / abs(self.step_deg)
+
+    @property
+    def step_deg(self) -> float:
+        """The turn by the shorter way, as 60 of 420 or of −300 degrees; 0 of a translation."""
+        return 0.0 if self.rotation is None else math.remainder(self.rotation.angle_deg, 360.0)
 
 
 def slave_positions(case: Case, bodies: dict[str, BuiltBody], reference: str, where: str) -> Array:
