@@ -159,6 +159,19 @@ def _master(
     return surface, master_rows(view, body, nodes, turns)
 
 
+def is_held(case: Case, view: View, reference: str) -> bool:
+    """Whether no node of a contact's boundary, point or line can move by itself."""
+    body = view.bodies[reference.partition(".")[0]]
+    nodes = None
+    if "." in reference:
+        at = case.location(reference)
+        if isinstance(at, PointRef):
+            return not view.point_rows(case, reference).free.nnz
+        assert body.mesh is not None, "checked: boundaries belong to meshes"
+        nodes = body.mesh.boundary_nodes(at.boundary)
+    return not view.node_rows(body, nodes).free.nnz
+
+
 def _require_same_part(case: Case, view: View, name: str, contact: ContactCase, master: Rows) -> None:
     """Raises CaseError where sides of a contact are not the same part of a whole. master: rows of all of its nodes."""
     if master.free.nnz:  # one that is held all over does not feel how many press on it

@@ -181,7 +181,7 @@ def master_rows(view: View, body: BuiltBody, nodes: IntArray, turns: Array | Non
 def repeats_of(case: Case, bodies: dict[str, BuiltBody], name: str) -> list[Repeat]:
     """How a body repeats: by ties with itself, or between those of the bodies that it is tied to as they lie, which
     make up its sector together. Several ties may stand for the parts of one cut."""
-    sector = _tied_as_they_lie(case, name)
+    sector = tied_as_they_lie(case, name)
     found: list[Repeat] = []
     for name_of_tie, tie in case.ties.items():
         slave, master = case.location(tie.slave), case.location(tie.master)
@@ -205,7 +205,7 @@ def repeats_of(case: Case, bodies: dict[str, BuiltBody], name: str) -> list[Repe
     return found
 
 
-def _tied_as_they_lie(case: Case, name: str) -> set[str]:
+def tied_as_they_lie(case: Case, name: str) -> set[str]:
     """A body and those that ties without a motion bond to it, or to those."""
     pairs = [
         (case.location(tie.slave).body, case.location(tie.master).body)

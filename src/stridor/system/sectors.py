@@ -67,7 +67,8 @@ def require_same_sectors(case: Case, bodies: dict[str, BuiltBody], name: str, co
             if clashing is not None:
                 accepted = (
                     f"repeats by {motion_words(clashing)}, the {moving.name} {moving.reference} by "
-                    f"{motion_words(repeat)}: what touches one sector of the one is no sector of the other. Let both repeat alike, or take both whole"
+                    f"{motion_words(repeat)}: what touches one sector of the one is no sector of the other. Let both "
+                    "repeat alike, or take both whole"
                 )
                 raise CaseError(where, other.reference, accepted)
             if other.facets and meets_itself(repeat, moving.ways, other, near):
@@ -189,21 +190,8 @@ def meets_itself(repeat: Repeat, ways: Array, side: Side, near: float, *, own: b
     reach = between(at, around)
     if reach is None or ((own or repeat.rotation is not None) and reach[1] - reach[0] <= 1.0 + TOUCHING):
         return False
-    where = ""
     samples, normals, size = samples_of(side.points, side.facets)
-    if side.points.shape[1] == 2:
-        surface: Curve | FacetSurface = Curve.side_by_side(
-            [Curve.from_facets(side.points, piece, where=where) for piece in pieces_of(side.facets)]
-        )
-    else:
-        # Each facet by itself: no matter how those of a slave meet.
-        alone = {kind: np.zeros_like(block) for kind, block in side.facets.items()}
-        order = np.concatenate([block.ravel() for block in side.facets.values()])
-        begin = 0
-        for kind, block in side.facets.items():
-            alone[kind] = begin + np.arange(block.size).reshape(block.shape)
-            begin += block.size
-        surface = FacetSurface.from_facets(side.points[order], alone, where=where)
+    surface = surface_of(side)
     lattice = np.zeros((0, side.points.shape[1])) if own else side.ways  # moves that are the side's own do not count
     for moved, turned in _moved(repeat, ways, side, lattice, reach, samples, normals, near):
         found = surface.locate(moved)
@@ -211,6 +199,21 @@ def meets_itself(repeat: Repeat, ways: Array, side: Side, near: float, *, own: b
         if bool(np.any(hit & (np.sum(turned * found.normal, axis=1) > ALONG))):
             return True
     return False
+
+
+def surface_of(side: Side) -> Curve | FacetSurface:
+    """The facets of a side as a surface, each by itself in space: no matter how those of a slave meet."""
+    where = ""
+    if side.points.shape[1] == 2:
+        pieces = pieces_of(side.facets)
+        return Curve.side_by_side([Curve.from_facets(side.points, piece, where=where) for piece in pieces])
+    alone = {kind: np.zeros_like(block) for kind, block in side.facets.items()}
+    order = np.concatenate([block.ravel() for block in side.facets.values()])
+    begin = 0
+    for kind, block in side.facets.items():
+        alone[kind] = begin + np.arange(block.size).reshape(block.shape)
+        begin += block.size
+    return FacetSurface.from_facets(side.points[order], alone, where=where)
 
 
 def _moved(
