@@ -154,6 +154,7 @@ def test_a_master_that_sectors_of_the_slave_find_otherwise_is_refused(what: str)
 ACCEPTED = {
     "a whole ring": (held(0.0, 360.0), 60.0),
     "a ring in other facets": (held(0.0, 360.0).replace("divisions = [1, 72]", "divisions = [1, 31]"), 60.0),
+    "a ring in the widest facets": (held(0.0, 360.0).replace("divisions = [1, 72]", "divisions = [1, 9]"), 60.0),
     "a quarter beyond both ends": (held(-15.0, 90.0), 60.0),
     "an eighth of a ring": (held(0.0, 45.0, turn("ring", 45.0)), 60.0),
     "a third of a ring": (held(10.0, 120.0, turn("ring", 120.0)), 60.0),

@@ -28,7 +28,9 @@ from .sectors import INWARDS, NEAR, Side, clash, meets_itself, motion_words, nea
 FRACTIONS = (0.3, 0.6, 1.0 - 2.0 * INWARDS)
 # Other steps than the first that are looked at where no number of them leads back to the beginning.
 MOST = 32
-SHARP = math.sin(math.radians(20.0))  # half of what makes a corner: there is no curve between such facets
+# Between the normals of a facet and of its nodes, which are half way to the next facet: where facets turn by more than
+# 40° there is a corner, and no curve.
+SHARP = 2.0 * math.sin(math.radians(10.0)) * (1.0 + TOUCHING)
 
 
 @dataclass(frozen=True)
