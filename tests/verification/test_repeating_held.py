@@ -161,6 +161,7 @@ ACCEPTED = {
     "pads by the same angle": (held(0.0, 20.0, hub(60.0)), 20.0),
     "a pad over the cut": (held(40.0, 40.0), 40.0),
     "a bore": (on_an_obstacle(BORE + SPIN), 60.0),
+    "a bore in other digits": (on_an_obstacle(BORE.replace("[0.0", "[1e-7") + SPIN), 60.0),
 }
 
 

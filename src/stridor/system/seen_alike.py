@@ -28,6 +28,8 @@ from .sectors import INWARDS, NEAR, Side, clash, meets_itself, motion_words, nea
 FRACTIONS = (0.3, 0.6, 1.0 - 2.0 * INWARDS)
 # Other steps than the first that are looked at where no number of them leads back to the beginning.
 MOST = 32
+# Of the size of what repeats: axes, ways and normals of a case file are given to as many digits.
+DIGITS = 1e-5
 # Between the normals of a facet and of its nodes, which are half way to the next facet: where facets turn by more than
 # 40° there is a corner, and no curve.
 SHARP = 2.0 * math.sin(math.radians(10.0)) * (1.0 + TOUCHING)
@@ -73,7 +75,7 @@ def require_seen_alike(
         whole = np.concatenate([points, *(at for at, _ in moved)])
         extent = max(extent, float(np.abs(whole - whole.mean(axis=0)).max()))
         # An obstacle is known to the digits of its numbers, facets of a curve to what is between it and its chords.
-        apart = np.full(len(points), TOUCHING * extent) if master is None else SAME * size + _bulge(master)
+        apart = np.full(len(points), DIGITS * extent) if master is None else SAME * size + _bulge(master)
         at, otherwise = _differs(seen(whole), whole, [turn for _, turn in moved], size, apart, master, both=both)
         if at is not None:
             _refuse(name, contact, repeat, at, otherwise)
