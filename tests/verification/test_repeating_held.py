@@ -177,6 +177,19 @@ def test_one_to_a_sector_or_a_longer_wall_is_accepted(text: str) -> None:
     st.build_system(loads(text))
 
 
+def test_of_a_point_its_own_place_counts() -> None:
+    """Under flats that meet at 40° of a sector from 0° to 60°: before and beyond that, where the next one is nearer."""
+    text = flat(10.0).replace('"wheel.outer"', '"wheel.tip"').replace("stiffness = 5e12", "stiffness = 5e9")
+    for degrees, refused in ((30.0, False), (50.0, True)):
+        at = (0.06 * np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])).tolist()
+        pointed = text.replace("[bodies.wheel]\n", f"[bodies.wheel]\npoints = {{ tip = {at} }}\n")
+        if refused:
+            with pytest.raises(CaseError, match=FACE + r"wheel\.tip, .* it is at another distance"):
+                st.build_system(loads(pointed))
+        else:
+            st.build_system(loads(pointed))
+
+
 @pytest.mark.parametrize("angle", [420.0, -300.0])
 def test_images_go_on_by_the_shorter_turn(angle: float) -> None:
     """As 60° does: a ring from the fourth sector lies on the wheel, and a whole one in it is refused."""

@@ -30,7 +30,7 @@ def require_places_of_their_own(
     sides = {
         name: found
         for name, contact in case.contacts.items()
-        if (found := [side_of(case, bodies, key, getattr(contact, key)) for key in KEYS])
+        if (found := [side_of(case, bodies, f"contacts.{name}.{key}", getattr(contact, key)) for key in KEYS])
         and any(side is not None and side.repeats for side in found)
     }
     for (first, one), (second, two) in itertools.combinations(sides.items(), 2):

@@ -53,7 +53,7 @@ class Side:
 def require_same_sectors(case: Case, bodies: dict[str, BuiltBody], name: str, contact: ContactCase) -> None:
     """Raises CaseError where one side of a contact repeats and the other one does so otherwise, or is longer than one
     sector of the first."""
-    sides = [side_of(case, bodies, key, getattr(contact, key)) for key in ("slave", "master")]
+    sides = [side_of(case, bodies, f"contacts.{name}.{key}", getattr(contact, key)) for key in ("slave", "master")]
     if any(side is None for side in sides):
         return
     slave, master = (side for side in sides if side is not None)
@@ -78,7 +78,7 @@ def require_same_sectors(case: Case, bodies: dict[str, BuiltBody], name: str, co
 def require_apart_from_images(case: Case, bodies: dict[str, BuiltBody], name: str, contact: ContactCase) -> None:
     """Raises CaseError where a side of a contact lies in the place of its own images by what its body repeats by."""
     for key in ("slave", "master"):
-        side = side_of(case, bodies, key, getattr(contact, key))
+        side = side_of(case, bodies, f"contacts.{name}.{key}", getattr(contact, key))
         if side is None or not side.facets:
             continue
         near = SAME * _smallest(side.points, side.facets)[1]
@@ -95,10 +95,10 @@ def require_apart_from_images(case: Case, bodies: dict[str, BuiltBody], name: st
 def lent_repeats(case: Case, bodies: dict[str, BuiltBody], contact: ContactCase) -> list[Repeat]:
     """Motions by which the slave of a contact repeats and its master does not, which is one of as many then: the slave
     meets the others of them beyond its own cut. None by which the master reaches into itself, as a whole ring does."""
-    slave = side_of(case, bodies, "slave", contact.slave)
+    slave = side_of(case, bodies, "contacts.slave", contact.slave)
     if slave is None or not slave.repeats:
         return []
-    master = side_of(case, bodies, "master", contact.master)
+    master = side_of(case, bodies, "contacts.master", contact.master)
     if master is None:
         return []
     near, nowhere = near_of(slave, master), np.zeros(0, dtype=np.int64)
@@ -111,8 +111,10 @@ def lent_repeats(case: Case, bodies: dict[str, BuiltBody], contact: ContactCase)
     ]
 
 
-def side_of(case: Case, bodies: dict[str, BuiltBody], key: str, reference: str) -> Side | None:
-    """A side of a contact, the line of a beam among them; None for an obstacle and for points of what has no mesh."""
+def side_of(case: Case, bodies: dict[str, BuiltBody], where: str, reference: str) -> Side | None:
+    """A side of a contact, whose key ``where`` ends in, the line of a beam among them; None for an obstacle and for
+    points of what has no mesh. A point has the points of its body."""
+    key = where.rpartition(".")[2]
     body = bodies.get(reference.partition(".")[0])
     if body is not None and body.beam is not None and reference == body.name:
         first = np.arange(len(body.points) - 1)
@@ -123,7 +125,7 @@ def side_of(case: Case, bodies: dict[str, BuiltBody], key: str, reference: str) 
     at = case.location(reference) if "." in reference else None
     if not isinstance(at, BoundaryRef):
         return Side(key, reference, repeats, body.points, {})
-    given = require_boundary(body.mesh, at.boundary, f"contacts.{key}")
+    given = require_boundary(body.mesh, at.boundary, where)
     nodes = np.unique(np.concatenate([block.ravel() for block in given.values()]))
     facets = {kind: np.searchsorted(nodes, block) for kind, block in given.items() if len(block)}
     return Side(key, reference, repeats, body.points[nodes], facets)

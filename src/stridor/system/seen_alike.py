@@ -21,7 +21,7 @@ from ..errors import CaseError
 from ..mesh.facets import facet_normals, nodal_normals
 from ..typing import Array, BoolArray
 from .bodies import BuiltBody
-from .repeats import SAME, TOUCHING, Repeat
+from .repeats import SAME, TOUCHING, Repeat, slave_positions
 from .sectors import INWARDS, NEAR, Side, clash, meets_itself, motion_words, near_of, repeats_by, samples_of, side_of
 
 # Of the way from the middle of a slave's facet to its nodes: what is narrower than between two of them is not seen.
@@ -54,11 +54,11 @@ def require_seen_alike(
 ) -> None:
     """Raises CaseError where sectors of a slave that repeats do not all find the same of a master. seen: the master
     below places (q, d) [m]."""
-    slave = side_of(case, bodies, "slave", contact.slave)
+    slave = side_of(case, bodies, f"contacts.{name}.slave", contact.slave)
     if slave is None or not slave.repeats:
         return
-    master = side_of(case, bodies, "master", contact.master)
-    points, size = _places(slave, master)
+    master = side_of(case, bodies, f"contacts.{name}.master", contact.master)
+    points, size = _places(slave, master, slave_positions(case, bodies, contact.slave, f"contacts.{name}.slave"))
     extent = float(np.abs(points - points.mean(axis=0)).max(initial=0.0))
     for repeat in slave.repeats:
         both = False
@@ -81,13 +81,14 @@ def require_seen_alike(
             _refuse(name, contact, repeat, at, otherwise)
 
 
-def _places(slave: Side, master: Side | None) -> tuple[Array, Array]:
-    """Points (q, d) [m] of a slave, within its facets, and the size (q,) [m] of these."""
+def _places(slave: Side, master: Side | None, nodes: Array) -> tuple[Array, Array]:
+    """Points (q, d) [m] of a slave, within its facets, and the size (q,) [m] of these; of a point its place alone, the
+    only one of nodes (1, d) [m]."""
     if slave.facets:
         parts = [samples_of(slave.points, slave.facets, fraction) for fraction in FRACTIONS]
         return np.concatenate([part[0] for part in parts]), np.concatenate([part[2] for part in parts])
     size = math.inf if master is None else near_of(slave, master) / SAME
-    return slave.points, np.full(len(slave.points), size)
+    return nodes, np.full(len(nodes), size)
 
 
 def _moved(repeat: Repeat, points: Array, master: Side | None, *, both: bool) -> Iterator[tuple[Array, Array]]:
