@@ -29,7 +29,8 @@ from .links import Links, links_of
 from .load_steps import LoadStep
 from .model import CubicSprings, Line, Solid, System
 from .motion import FreeStructure, PrescribedMotion, constrain, distance_name
-from .pairs import is_point_on_line, point_contact, surface_contact
+from .pairs import is_held, is_point_on_line, point_contact, surface_contact
+from .same_place import require_places_of_their_own
 from .supports import Tied, constraints_of, tie_matrix
 from .view import View
 
@@ -70,6 +71,7 @@ def build_system(
             contacts.append(point_contact(case, view, name, contact))
         else:
             surfaces.append(surface_contact(case, view, name, contact))
+    require_places_of_their_own(case, bodies, lambda reference: is_held(case, view, reference))
     names = _dof_names(bodies)
     solids = tuple(
         Solid(body.name, body.points, _cells(body), view.node_rows(body), view.freedoms_of(body))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -24,7 +25,8 @@ from ..mesh.model import Blocks
 from ..typing import Array, IntArray
 from .motion import distance_name
 from .repeats import ALIKE, Repeat, master_nodes, master_rows
-from .sectors import lent_repeats, require_same_sectors
+from .sectors import lent_repeats, require_apart_from_images, require_same_sectors
+from .seen_alike import Seen, require_seen_alike
 from .view import View, point_position
 
 
@@ -38,12 +40,13 @@ def point_contact(case: Case, view: View, name: str, contact: ContactCase) -> Co
     master = view.bodies[contact.master]
     at = case.point(contact.slave)
     position = point_position(case, view.bodies, at)
-    slave = view.point_rows(case, contact.slave)
+    slave, line = view.point_rows(case, contact.slave), view.node_rows(master)
+    _require_same_part(case, view, name, contact, line)
     built = pair(
         name,
         slave=Rows(slave.free[:2], slave.lift[:2]),
         slave_position=position,
-        master=view.node_rows(master),
+        master=line,
         master_positions=master.points,
         side=case.side(name),
         stiffness=np.inf if contact.stiffness == "rigid" else float(contact.stiffness),
@@ -64,10 +67,10 @@ def point_contact(case: Case, view: View, name: str, contact: ContactCase) -> Co
 def surface_contact(case: Case, view: View, name: str, contact: ContactCase) -> SurfaceContact:
     """Slave nodes of a boundary, or one point, on a boundary or an obstacle."""
     where = f"contacts.{name}"
+    require_apart_from_images(case, view.bodies, name, contact)
     slave_rows, position, area, normals, facets, freedoms = _slave(case, view, where, contact)
     master, master_rows = _master(case, view, where, contact, position)
-    if master_rows.free.nnz:  # one that is held all over does not feel how many press on it
-        require_same_sectors(case, view.bodies, name, contact)
+    _require_same_part(case, view, name, contact, master_rows)
     slave_body = case.location(contact.slave).body
     drift = _drift(case, view, slave_body, contact.master.partition(".")[0], position)
     built = pair_surface(
@@ -154,6 +157,35 @@ def _master(
     if turns is not None and sliding is not None:
         _require_images_that_slide(where, contact, sliding, lent, body.points[nodes])
     return surface, master_rows(view, body, nodes, turns)
+
+
+def is_held(case: Case, view: View, reference: str) -> bool:
+    """Whether no node of a contact's boundary, point or line can move by itself."""
+    body = view.bodies[reference.partition(".")[0]]
+    nodes = None
+    if "." in reference:
+        at = case.location(reference)
+        if isinstance(at, PointRef):
+            return not view.point_rows(case, reference).free.nnz
+        assert body.mesh is not None, "checked: boundaries belong to meshes"
+        nodes = body.mesh.boundary_nodes(at.boundary)
+    return not view.node_rows(body, nodes).free.nnz
+
+
+def _require_same_part(case: Case, view: View, name: str, contact: ContactCase, master: Rows) -> None:
+    """Raises CaseError where sides of a contact are not the same part of a whole. master: rows of all of its nodes."""
+    if master.free.nnz:  # one that is held all over does not feel how many press on it
+        require_same_sectors(case, view.bodies, name, contact)
+    if not master.free.nnz or contact.master in case.beams:
+        require_seen_alike(case, view.bodies, name, contact, partial(_seen, case, view, f"contacts.{name}", contact))
+
+
+def _seen(case: Case, view: View, where: str, contact: ContactCase, places: Array) -> Seen:
+    """The master below places (q, d) [m]."""
+    surface, rows = _master(case, view, where, contact, places)
+    sliding: SlidingTable | None = getattr(case.bodies[contact.master.partition(".")[0]], "sliding", None)
+    lift = rows.lift.reshape(surface.node_count, surface.dimension, rows.lift.shape[1])
+    return Seen(surface, lift, np.zeros_like if sliding is None else partial(material_velocity, sliding))
 
 
 def _require_images_that_slide(

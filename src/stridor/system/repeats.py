@@ -110,14 +110,19 @@ class Repeat:
         first = first - (first @ axis) * axis
         first /= np.linalg.norm(first)
         x, y = arm @ first, arm @ np.cross(axis, first)
-        angle = np.arctan2(y, x) / math.radians(self.rotation.angle_deg)
+        angle = np.arctan2(y, x) / math.radians(self.step_deg)
         size = np.hypot(x, y)
         return np.where(size > ALIKE * np.abs(arm).max(initial=0.0), angle, np.nan)
 
     @property
     def around(self) -> float:
         """Sectors of a whole turn, infinite of a translation."""
-        return math.inf if self.rotation is None else 360.0 / abs(self.rotation.angle_deg)
+        return math.inf if self.rotation is None else 360.0 / abs(self.step_deg)
+
+    @property
+    def step_deg(self) -> float:
+        """The turn by the shorter way, as 60 of 420 or of −300 degrees; 0 of a translation."""
+        return 0.0 if self.rotation is None else math.remainder(self.rotation.angle_deg, 360.0)
 
 
 def slave_positions(case: Case, bodies: dict[str, BuiltBody], reference: str, where: str) -> Array:
@@ -176,7 +181,7 @@ def master_rows(view: View, body: BuiltBody, nodes: IntArray, turns: Array | Non
 def repeats_of(case: Case, bodies: dict[str, BuiltBody], name: str) -> list[Repeat]:
     """How a body repeats: by ties with itself, or between those of the bodies that it is tied to as they lie, which
     make up its sector together. Several ties may stand for the parts of one cut."""
-    sector = _tied_as_they_lie(case, name)
+    sector = tied_as_they_lie(case, name)
     found: list[Repeat] = []
     for name_of_tie, tie in case.ties.items():
         slave, master = case.location(tie.slave), case.location(tie.master)
@@ -200,7 +205,7 @@ def repeats_of(case: Case, bodies: dict[str, BuiltBody], name: str) -> list[Repe
     return found
 
 
-def _tied_as_they_lie(case: Case, name: str) -> set[str]:
+def tied_as_they_lie(case: Case, name: str) -> set[str]:
     """A body and those that ties without a motion bond to it, or to those."""
     pairs = [
         (case.location(tie.slave).body, case.location(tie.master).body)
