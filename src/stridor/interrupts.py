@@ -83,9 +83,14 @@ def heard() -> None:
     _stop_insisting()
 
 
+def pending() -> bool:
+    """Whether an interrupt was raised that nobody has caught as one."""
+    return _program.pending
+
+
 def check() -> None:
     """Raise KeyboardInterrupt if one was asked for and got lost on its way."""
-    if _program.pending:
+    if pending():
         raise KeyboardInterrupt
 
 

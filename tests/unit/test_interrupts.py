@@ -9,6 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from stridor import interrupts
+from stridor.app import cli
+
 DROPPED = """
 import ctypes, sys, time
 from stridor import interrupts
@@ -109,3 +112,20 @@ def test_an_interrupt_amid_what_python_makes_of_text_is_no_death_by_a_signal(tmp
     )
     done = subprocess.run([sys.executable, "-m", "program"], cwd=tmp_path, capture_output=True, check=False, timeout=60)
     assert (done.returncode, done.stderr) == (130, b"")
+
+
+@pytest.mark.parametrize("asked", [True, False])
+def test_what_a_library_makes_of_an_interrupt_ends_the_program_as_one(monkeypatch, capsys, asked: bool) -> None:
+    def called() -> int:
+        if asked:
+            interrupts._program.pending = True
+        raise SystemError("returned a result with an exception set")
+
+    monkeypatch.setattr(interrupts, "_program", interrupts._Program([]))
+    if asked:
+        assert cli._guarded(called) == interrupts.INTERRUPTED
+        assert capsys.readouterr().err == "stridor: interrupted\n"
+        assert not interrupts.pending()
+    else:
+        with pytest.raises(SystemError):
+            cli._guarded(called)

@@ -76,9 +76,7 @@ def _guarded(call: Callable[[], int | None]) -> int:
         _refuse(f"stridor: {error}" if "\n" not in str(error) else f"stridor:\n{error}")
         return 2 if isinstance(error, CaseError) else 1
     except KeyboardInterrupt:
-        interrupts.heard()
-        print("stridor: interrupted", file=sys.stderr)
-        return interrupts.INTERRUPTED
+        return _interrupted()
     except BrokenPipeError:
         return 0
     except OSError as error:
@@ -88,7 +86,18 @@ def _guarded(call: Callable[[], int | None]) -> int:
     except (OverflowError, MemoryError) as error:
         print(f"stridor: a number of the case is out of range for this computation ({error})", file=sys.stderr)
         return 1
+    except Exception:
+        # Compiled modules that an interrupt meets amid their import make an error of their own of it (SystemError).
+        if not interrupts.pending():
+            raise
+        return _interrupted()
     return code or 0
+
+
+def _interrupted() -> int:
+    interrupts.heard()
+    print("stridor: interrupted", file=sys.stderr)
+    return interrupts.INTERRUPTED
 
 
 def _refuse(text: str) -> None:
