@@ -390,6 +390,42 @@ def test_gaps_stay_closed_on_a_basis_that_is_handed_on_again_and_again() -> None
     assert widest < 1e-13
 
 
+def test_shapes_that_the_full_problem_has_at_the_high_end_save_solving_for_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    def counted(known: bool) -> tuple[st.Onsets, list[int]]:
+        """The onsets, and the right sides that each stretch took."""
+        solves: list[int] = []
+        take = Carried.take
+
+        def taken(self: Carried, reduced, beyond: float) -> None:
+            solves.append(reduced.solves)
+            take(self, reduced, beyond)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(Carried, "take", taken)
+            if not known:
+                patch.setattr(over_friction, "_shapes_at", lambda *_: None)
+            return st.onsets(coarse(0.45)), solves
+
+    (found, fewer), (plain, solves) = counted(True), counted(False)
+    assert len(fewer) == len(solves) > 1
+    assert sum(fewer) < 0.8 * sum(solves), (fewer, solves)
+    assert [o.mu for o in found] == pytest.approx([o.mu for o in plain], rel=1e-9)
+
+
+def test_shapes_of_the_full_problem_close_the_gaps_and_tell_no_forces_of_rigid_contact() -> None:
+    system = build_system(coarse(0.45))
+    problem = problem_of(system, 0.1, Options())
+    shapes = growing_modes(system, 0.3, 20e3, touching_at=0.1).shapes
+    assert shapes is not None
+    carried = Carried(at_end=lambda: shapes)
+    known = carried.exact_at_end(problem)
+    assert known is not None
+    assert known.count >= shapes.shape[1]
+    assert np.abs(problem.normal @ known.u + problem.compliance[:, None] * known.p).max() < 1e-16
+    assert carried.exact_at_end(replace(problem, compliance=np.zeros_like(problem.compliance))) is None
+    assert Carried(at_end=lambda: None).exact_at_end(problem) is None
+
+
 @pytest.mark.slow  # in each run: the test before on growth from above the band
 def test_growth_that_ends_above_the_band_is_not_taken_for_what_comes_into_it_later() -> None:
     """At 27 kHz a mode grows from μ = 0.226, where a node opens, to 0.464; at 0.5176 it begins again, just above the

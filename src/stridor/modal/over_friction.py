@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -22,7 +23,7 @@ from .complex_modes import complex_modes
 from .from_above import WIDER, Returning, with_origins
 from .full import full_onsets
 from .full.basis import WHOLE
-from .growing import UNCHECKED, growing_modes
+from .growing import UNCHECKED, affordable, growing_modes
 from .joined import TouchingChange, joined_modes, joined_onsets, rows_of
 from .krylov import Carried
 from .onsets import Onsets, onsets
@@ -185,6 +186,19 @@ def onsets_of_band(
     return system.once(asked, lambda: _solved_onsets(system, (low, high), max_frequency_hz, damped, chosen))
 
 
+def _shapes_at(
+    held: System, mu: float, max_frequency_hz: float, damped: bool, options: Options
+) -> ComplexArray | None:
+    """Shapes (n, k) of the full problem at μ, which `checked_onsets` looks for; None where it does not."""
+    if not affordable(held):
+        return None
+    try:
+        found = growing_modes(held, mu, max_frequency_hz, touching_at=None, damped=damped, options=options)
+    except AnalysisError:  # whoever checks the onsets says so
+        return None
+    return found.shapes
+
+
 def _solved_onsets(
     system: System, friction_range: tuple[float, float], max_frequency_hz: float, damped: bool, options: Options
 ) -> Onsets:
@@ -193,6 +207,7 @@ def _solved_onsets(
     def solved(held: System, between: tuple[float, float], before: Onsets | None = None) -> Onsets:
         # Behind a border branches have the names that they had before it.
         numbered_at = 0.0 if before is None else between[0]
+        carried.at_end = partial(_shapes_at, held, between[1], max_frequency_hz, damped, options)
         try:
             found = onsets(
                 held, between, max_frequency_hz=max_frequency_hz, damped=damped, numbered_at=numbered_at,

@@ -8,16 +8,17 @@ counted anew, whichever way a basis began.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sl
 
 from ...errors import AnalysisError
-from ...typing import Array, IntArray
+from ...typing import Array, ComplexArray, IntArray
 from .problem import ContactProblem
 from .reduced import Reduced
-from .shifted import ForcedShapes, Shifted
+from .shifted import ForcedShapes, Shifted, real_columns
 
 STIFFEST = 1e3  # times the structure's stiffness: forces of contact stiffer than that are not told by its displacement
 
@@ -25,19 +26,28 @@ STIFFEST = 1e3  # times the structure's stiffness: forces of contact stiffer tha
 @dataclass
 class Carried:
     """Shapes that the last basis had, with forces of the nodes that ``touching`` names, frictionless modes first, of
-    which there are ``modes``, for a band up to ``frequency`` [1/s]; empty at first."""
+    which there are ``modes``, for a band up to ``frequency`` [1/s]; empty at first. at_end: asked for exact shapes
+    (n, k) at the high end of the stretch, which the full problem is solved for anyhow; None where it has none."""
 
+    at_end: Callable[[], ComplexArray | None] | None = None
     shapes: ForcedShapes | None = None
     touching: IntArray | None = None
     modes: int = 0
     frequency: float = 0.0
 
+    def exact_at_end(self, problem: ContactProblem) -> ForcedShapes | None:
+        """What ``at_end`` gives, in real columns with forces of contact that close the gaps; None without it."""
+        found = None if self.at_end is None or not _tells_forces(problem) else self.at_end()
+        if found is None or not found.shape[1]:
+            return None
+        shapes = real_columns(found)
+        return ForcedShapes(shapes, -(problem.normal @ shapes) / problem.compliance[:, None])
+
     def fit(self, problem: ContactProblem, frequency: float) -> bool:
         """Whether a basis of the problem up to a frequency [1/s] can begin with them."""
         if self.shapes is None or frequency != self.frequency or len(self.shapes.u) != problem.size:
             return False
-        softest = 1.0 / (STIFFEST * float(np.abs(problem.stiffness.data).max(initial=0.0)) or 1.0)
-        return bool(np.all(problem.compliance >= softest))
+        return _tells_forces(problem)
 
     def basis(self, problem: ContactProblem, shifted: Shifted, top: float, highest: float) -> tuple[Reduced, Array]:
         """The problem on them, and ω² (k,) of its modes without friction, ascending."""
@@ -59,6 +69,12 @@ class Carried:
         self.shapes = reduced.pairs.combined(np.hstack([near, reduced.exact]))
         self.touching = reduced.problem.touching
         self.modes, self.frequency = near.shape[1], reduced.frequency
+
+
+def _tells_forces(problem: ContactProblem) -> bool:
+    """Whether displacements tell the forces of every contact."""
+    softest = 1.0 / (STIFFEST * float(np.abs(problem.stiffness.data).max(initial=0.0)) or 1.0)
+    return bool(np.all(problem.compliance >= softest))
 
 
 def _frictionless(reduced: Reduced) -> tuple[Array, Array]:

@@ -80,7 +80,9 @@ def krylov_onsets(
     # Modes that start above the band may meet inside it.
     reduced = projected(problem, Band(1, top * follow), high, carried)
     keep_standing(system, options or Options(), reduced.shifted)
-    converge_over(reduced, numbered_at + samples(high - numbered_at, _count_of_samples(numbered_at, high)))
+    at_end = None if carried is None else carried.exact_at_end(problem)
+    frictions = numbered_at + samples(high - numbered_at, _count_of_samples(numbered_at, high))
+    converge_over(reduced, frictions, at_end=at_end)
     if carried is not None:
         carried.take(reduced, GUARD)
     telling = reduced.narrowed(TELLING)

@@ -20,7 +20,7 @@ from ..tolerances import BELIEVED
 from .carried import Carried
 from .problem import ContactProblem
 from .reduced import Reduced
-from .shifted import Shifted, frictionless_modes, modes_below, real_columns, shift_for
+from .shifted import ForcedShapes, Shifted, frictionless_modes, modes_below, real_columns, shift_for
 
 TOLERANCE = 2e-11  # backward error at which an eigenpair counts as found: eigenvalues are right to 1e-9 then
 GROWTH = 1e-9  # and between the ends of a range, where growth must be known but onsets are solved for by themselves
@@ -172,11 +172,19 @@ def converge_at(
             reduced.compress()
 
 
-def converge_over(reduced: Reduced, frictions: Array, *, between: float = GROWTH, left: bool = False) -> None:
+def converge_over(
+    reduced: Reduced, frictions: Array, *, between: float = GROWTH, left: bool = False,
+    at_end: ForcedShapes | None = None,
+) -> None:  # fmt: skip
     """`converge_at` over a range: exact at its ends, up to a backward error ``between`` them; each μ in the middle of
-    those before, so that most find nothing left to do."""
+    those before, so that most find nothing left to do. at_end: shapes that are known at the high end."""
     values = np.unique(frictions)
-    converge_at(reduced, values[[-1, 0]], left=left)
+    if at_end is None:
+        converge_at(reduced, values[[-1, 0]], left=left)
+    else:  # which the low end, often that of a basis handed on, would only be slowed down by
+        converge_at(reduced, values[[0]], left=left)
+        reduced.add(at_end)
+        converge_at(reduced, values[[-1]], left=left)
     parts = [(0, len(values) - 1)]
     for low, high in parts:
         if high - low > 1:
