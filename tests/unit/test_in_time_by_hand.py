@@ -22,6 +22,7 @@ from stridor.system import System
 from stridor.temporal import attractor, beta2, inputs, restart, saved, settings, signals, sketch
 from stridor.temporal.beta2 import StepLimit, scheme
 from stridor.temporal.energy import EnergyBalance
+from stridor.temporal.growth import growth
 from stridor.temporal.schedule import PhaseSpec, lay_out
 from stridor.temporal.settings import Settings
 from stridor.temporal.sketch import SketchPart
@@ -102,20 +103,20 @@ def test_an_envelope_has_the_amplitude_at_its_times() -> None:
 def test_nothing_grows_where_there_is_no_line_or_no_signal() -> None:
     signal = np.cos(np.arange(1000.0))
     for given, frequency in ((signal, 0.0), (signal, -1.0), (signal[:31], 100.0)):
-        found = signals.growth(given, 1e-3, frequency)
+        found = growth(given, 1e-3, frequency)
         assert (found.rate, found.start, found.spread, found.saturated, found.amplitude) == (0.0, 0.0, 0.0, False, 0.0)
         assert found.end == pytest.approx(1e-3 * len(given))
-    assert signals.growth(signal[:32], 1e-3, 100.0).amplitude > 0
+    assert growth(signal[:32], 1e-3, 100.0).amplitude > 0
 
 
 def test_a_fall_is_fitted_from_its_highest_point() -> None:
     dt, f = 1e-5, 1000.0
     time = np.arange(40_000) * dt
     size = np.where(time < 0.1, 1.0, np.exp(-20.0 * (time - 0.1)))
-    found = signals.growth(size * np.cos(2 * np.pi * f * time), dt, f)
+    found = growth(size * np.cos(2 * np.pi * f * time), dt, f)
     assert found.end == pytest.approx(0.39, abs=0.003)
     assert not found.saturated
-    decay = signals.growth(np.exp(-20 * time) * np.cos(2 * np.pi * f * time), dt, f)
+    decay = growth(np.exp(-20 * time) * np.cos(2 * np.pi * f * time), dt, f)
     assert decay.rate == pytest.approx(-20.0, rel=1e-3)
     assert decay.spread < 1e-2
     assert decay.amplitude == pytest.approx(np.exp(-20 * (0.01 + 0.38 * 7 / 8)), rel=0.05)

@@ -5,7 +5,8 @@ import pytest
 from scipy.signal import windows
 
 from stridor.temporal import signals
-from stridor.temporal.signals import STOP_DECIBELS, components, growth, low_passed
+from stridor.temporal.growth import growth
+from stridor.temporal.signals import STOP_DECIBELS, components, low_passed
 
 SAMPLING, BAND = 2e-6, 20e3
 

@@ -19,7 +19,8 @@ from stridor.modal.complex_modes import ComplexModes
 from stridor.modal.onsets import Onset, Onsets
 from stridor.system import System, build_system
 from stridor.temporal.energy import EnergyBalance, energy_balance
-from stridor.temporal.signals import Components, Growth, spectrogram, spectrum
+from stridor.temporal.growth import Growth
+from stridor.temporal.signals import Components, spectrogram, spectrum
 from stridor.temporal.trajectory import ContactStatistics, PhaseResult, Trajectory
 from stridor.view import plots
 from stridor.view.shape_plots import at_best_phase

@@ -15,7 +15,8 @@ from stridor.case import template_text
 from stridor.modal.complex_modes import complex_modes
 from stridor.modal.onsets import onsets
 from stridor.study.analyses import settings_of
-from stridor.temporal.signals import Components, components, envelope, growth, spectrogram, spectrum
+from stridor.temporal.growth import growth
+from stridor.temporal.signals import Components, components, envelope, spectrogram, spectrum
 from stridor.view.temporal_tables import agreement_table
 
 pytestmark = pytest.mark.verification

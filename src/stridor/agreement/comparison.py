@@ -19,9 +19,10 @@ from ..modal.complex_modes import ComplexModes
 from ..modal.growing import doubt
 from ..modal.options import Options
 from ..system import System
+from ..temporal.growth import Growth, growth
 from ..temporal.schedule import PhaseSpec
 from ..temporal.shapes import operating_shape
-from ..temporal.signals import Components, Growth, Spectrum, growth, low_passed, spectrum
+from ..temporal.signals import Components, Spectrum, low_passed, spectrum
 from ..temporal.simulate import Settings, simulate
 from ..temporal.trajectory import Trajectory
 from ..threads import one_thread

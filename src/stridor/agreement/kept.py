@@ -7,7 +7,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..temporal.signals import Components, Growth
+from ..temporal.growth import Growth
+from ..temporal.signals import Components
 from .small_motion import Perturbation
 
 Plain = Mapping[str, Any]

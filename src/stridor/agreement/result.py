@@ -13,7 +13,7 @@ from ..digits import measured, readable
 from ..modal.onset import refuted
 from ..notebook import Shown, html_table
 from ..tabular import Cell, Rows, Tabular, dataset, split
-from ..temporal.signals import Growth
+from ..temporal.growth import Growth
 from .settled import SettledVelocity
 from .small_motion import LEVEL, Perturbation
 

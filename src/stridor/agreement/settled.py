@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..modal.results import ComplexModes
-from ..temporal.signals import Growth, line_frequency
+from ..temporal.growth import Growth
+from ..temporal.signals import line_frequency
 from ..temporal.trajectory import Trajectory
 from .kept import Plain
 

@@ -162,7 +162,7 @@ def of_countermeasures(result: Countermeasures, value_of: Callable[[str], float]
 
 def of_run(summary: dict[str, Any], *, slides: bool = True) -> Conclusion:
     """What vibrates at the end of a run in time; then both approaches side by side, where bodies slide steadily."""
-    from ..temporal.signals import state_of
+    from ..temporal.growth import state_of
 
     if summary["dominant_frequency_hz"] is None:
         said = (

@@ -18,7 +18,7 @@ from ..modal.onset import Onset, Onsets
 from ..modal.results import grows
 from ..study.analyses import compare, modes, onsets, simulate, steady_sliding, summarise
 from ..study.workspace import Unsaved, Workspace
-from ..temporal.signals import Growth
+from ..temporal.growth import Growth
 from ..temporal.trajectory import Trajectory
 from ..typing import ComplexArray, IntArray
 from .checks import FRICTION

@@ -16,7 +16,8 @@ from ..sliding import full_motion, slip_speeds
 from ..temporal.attractor import settled_contacts
 from ..temporal.changes import changes_of
 from ..temporal.energy import EnergyBalance, energy_balance
-from ..temporal.signals import Growth, components
+from ..temporal.growth import Growth
+from ..temporal.signals import components
 from ..temporal.trajectory import RUN, Trajectory
 from .workspace import Problem, Workspace
 
