@@ -134,6 +134,43 @@ def test_rows_of_contacts_make_a_system(tmp_path: Path) -> None:
     assert [o.mu for o in found] == pytest.approx(onsets(case)[:, 0], rel=1e-9)
 
 
+@pytest.mark.parametrize("mu", [None, 0.3])
+def test_rows_of_a_contact_that_pulls_are_along_the_slip(mu: float | None, tmp_path: Path) -> None:
+    """A block pulled off at its left: the friction of nodes that pull is told by the sign of their force, not of rows."""
+    tilted = {"loads.tilt": {"at": "block.left", "force": [0.0, 4e3]}, "contacts.face.closed": True}
+    case = st.loads(rubbing_block("max_frequency_hz = 60e3")).with_(tilted)
+    st.export(case, tmp_path, format="npz", mu=mu)
+    table = rows(tmp_path / "contacts.csv")
+    force = st.steady_sliding(case, mu).normal_force
+    sign = np.array([float(r["force_sign"]) for r in table])
+    assert np.array_equal(sign, np.where(force < 0.0, -1.0, 1.0))
+    assert 0 < np.sum(sign < 0.0) < len(sign)
+    normal, tangent = (sp.load_npz(tmp_path / f"{name}.npz") for name in ("normal", "tangent"))
+    # The belt moves to the right, the block slips to the left on it at every node.
+    along = np.array([1.0 if (r["body"], r["direction"]) == ("block", "x") else 0.0 for r in rows(tmp_path / "freedoms.csv")])
+    assert tangent @ along == pytest.approx(-np.ones(len(sign)))
+    springs = sp.diags_array([float(r["stiffness_n_m"]) for r in table])
+    rubbing = -tangent.T @ sp.diags_array(sign) @ springs @ normal
+    if mu is None:
+        found = sp.load_npz(tmp_path / "Kf.npz")
+    else:
+        system = st.build_system(case)
+        found = (sp.load_npz(tmp_path / "K.npz") - system.stiffness - normal.T @ springs @ normal) / mu
+    assert abs(rubbing - found).max() <= 1e-11 * springs.diagonal().max()
+    if mu is not None:
+        return
+    # A system of these rows finds the sign itself.
+    contacts = {
+        f"n{k}": {"normal": n, "tangent": t, "stiffness": float(r["stiffness_n_m"]), "closed": True, "gap": float(r["gap_m"]),
+                 "friction": {"law": "coulomb", "coefficient": float(r["friction_coefficient"])}}
+        for k, (n, t, r) in enumerate(zip(normal.toarray(), tangent.toarray(), table, strict=True))
+    }  # fmt: skip
+    mass, damping, stiffness = (sp.load_npz(tmp_path / f"{name}.npz") for name in "MCK")
+    loads = {"all": sp.load_npz(tmp_path / "loads.npz").sum(axis=1)}
+    system = st.System.from_matrices(mass, damping, stiffness, contacts=contacts, loads=loads)
+    assert st.steady_sliding(system).normal_force == pytest.approx(force, rel=1e-9)
+
+
 def _row(path: Path) -> np.ndarray:
     return sio.mmread(path).toarray()[0]
 

@@ -15,6 +15,7 @@ from stridor.contact.facets import FacetSurface
 from stridor.contact.obstacles import Flat
 from stridor.contact.ties import Bond, tie, tie_transformation
 from stridor.errors import CaseError
+from stridor.mesh.facets import shape_functions
 from stridor.system.supports import Tied
 
 
@@ -64,6 +65,56 @@ def test_curved_quadratic_facets_are_met_on_the_facet_itself():
     found = tie((shape @ points[[2, 4, 3]])[None], curve, where="w", tolerance=1e-12)
     np.testing.assert_array_equal(found.nodes, [[2, 4, 3]])
     np.testing.assert_allclose(found.weights, [shape], atol=1e-12)
+
+
+def barrel(kind, bent=0.0):
+    """Faces of a kind on a cylinder of radius one over two radians, their nodes off it by ``bent`` [m]."""
+    angle, height = np.meshgrid(np.linspace(0.0, 2.0, 7), np.linspace(0.0, 1.0, 5), indexing="ij")
+    points = np.stack([np.cos(angle), np.sin(angle), height], axis=-1).reshape(-1, 3)
+    points += bent * np.random.default_rng(4).standard_normal(points.shape)
+    number = np.arange(len(points)).reshape(7, 5)
+    faces = []
+    for i, j in np.ndindex(3, 2):
+        of = number[2 * i : 2 * i + 3, 2 * j : 2 * j + 3]
+        corners, middles, centre = of[[0, 2, 2, 0], [0, 0, 2, 2]], of[[1, 2, 1, 0], [0, 1, 2, 1]], of[1, 1]
+        if kind == "triangle6":
+            faces.append([*corners[[0, 1, 2]], middles[0], middles[1], centre])
+            faces.append([*corners[[0, 2, 3]], centre, middles[2], middles[3]])
+        else:
+            faces.append([*corners, *middles, *([centre] if kind == "quad9" else [])])
+    return FacetSurface.from_facets(points, {kind: np.array(faces)}, where="w"), np.array(faces), points
+
+
+@pytest.mark.parametrize("bent", [0.0, 0.01])
+@pytest.mark.parametrize("kind", ["triangle6", "quad8", "quad9"])
+def test_curved_quadratic_faces_are_met_on_the_face_itself(kind, bent):
+    surface, faces, points = barrel(kind, bent)
+    rng = np.random.default_rng(2)
+    local = rng.uniform(0.0, 1.0, (len(faces) * 5, 2))
+    if kind == "triangle6":
+        local = np.where(local.sum(axis=1, keepdims=True) > 1.0, 1.0 - local, local)
+    faces = np.repeat(faces, 5, axis=0)
+    on_it = np.einsum("qr,qrd->qd", shape_functions(kind, local)[0], points[faces])
+    found = tie(on_it, surface, where="w", tolerance=1e-12)
+    # A field that each face interpolates by its own functions is passed as they say.
+    field = rng.standard_normal(len(points))
+    own = np.einsum("qr,qr->q", shape_functions(kind, local)[0], field[faces])
+    np.testing.assert_allclose(np.sum(found.weights * field[surface.nodes][found.nodes], axis=1), own, atol=1e-11)
+
+
+@pytest.mark.parametrize("kind", ["triangle6", "quad8", "quad9"])
+def test_no_place_on_quadratic_faces_is_nearer_than_the_one_found(kind):
+    surface, faces, points = barrel(kind, 0.01)
+    steps = np.linspace(0.0, 1.0, 41)
+    local = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    if kind == "triangle6":
+        local = local[local.sum(axis=1) < 1.0 + 1e-12]
+    places = np.einsum("qr,frd->fqd", shape_functions(kind, local)[0], points[faces]).reshape(-1, 3)
+    beside = places[::37] + 0.1 * np.random.default_rng(3).standard_normal(places[::37].shape)
+    found = tie(beside, surface, where="w", tolerance=1.0)
+    nearest = np.linalg.norm(beside[:, None, :] - places, axis=2).min(axis=1)
+    assert np.all(found.distance < nearest + 1e-12)
+    assert np.all(found.distance > nearest - 0.01)
 
 
 @settings(max_examples=20)

@@ -451,6 +451,42 @@ def test_a_mass_that_two_walls_hold():
     assert found.normal_force[-1] == pytest.approx([1.0, 1.0], abs=1e-12)
 
 
+LIMIT = """
+units = "nondimensional"
+bodies.m = { type = "mass", mass = 1.0, position = [0.0, 0.0] }
+bodies.w = { type = "mass", mass = 1.0, position = [1.0, 0.0] }
+bodies.belt = { type = "obstacle", shape = "flat", point = [0, 0], normal = [0, 1], sliding.velocity = [0.2, 0.0] }
+springs.k = { between = ["m", "w"], direction = [1.0, 0.0], stiffness = 1.0 }
+springs.g = { between = ["m", "ground"], direction = [1.0, 0.0], stiffness = 1.0 }
+loads.p = { at = "m", force = [0.0, -1.0] }
+supports.s = { at = "w", fixed = ["x", "y"], velocity.x = 0.05, displacement.x = 0.3 }
+contacts.rub = { slave = "m", master = "belt", stiffness = "rigid", friction = { law = "coulomb", coefficient = 0.3 } }
+temporal = { step = 1e-3, stepper = "exact", watch = ["m"] }
+[[phases]]
+name = "press"
+duration = 2.0
+ramp = 1.0
+velocities = { belt = 0.0, s = 0.0 }
+[[phases]]
+name = "slide"
+duration = 2.0
+ramp = 0.5
+velocities = { belt = -1.0, s = 1.0 }
+loads = { p = 2.0 }
+"""
+
+
+def test_a_mass_that_is_pulled_just_as_much_as_friction_holds_stays():
+    """Pull and pressure on one ramp, k d = μN all the while: it neither slips nor sticks by turns of rounding."""
+    case = st.loads(LIMIT)
+    exact, explicit = (st.simulate(case.with_({"temporal.stepper": name})) for name in ("exact", "explicit"))
+    rest = (exact.time > 1.01) & (exact.time < 2.0)
+    assert np.all(exact.status[rest, 0] == STICK)
+    assert np.abs(exact.tangential_force[rest, 0]) == pytest.approx(0.3, rel=1e-12)
+    size = np.abs(explicit.displacement).max()
+    assert np.abs(exact.displacement - explicit.displacement).max() < 1e-3 * size
+
+
 def test_a_root_of_a_number_that_is_zero_has_its_modes():
     numbers, modes = numbers_of(np.zeros((1, 1), dtype=complex), np.array([1j]), np.array([[0.0, 0.0, 0.0, -1.0]])), np.full(2, np.nan)
     code, _, when, *_ = first_root(

@@ -695,3 +695,51 @@ def test_a_step_of_which_all_phases_are_multiples():
     step = whole_steps(settings, phases)
     assert step == pytest.approx(0.025)
     assert whole_steps(settings, phases[:1]) == pytest.approx(0.1 / 3)
+
+
+TOUCHING = """
+[materials.steel]
+young_modulus = 200e9
+density = 7800.0
+poisson_ratio = 0.3
+[bodies.a]
+type = "solid"
+material = "steel"
+model = "plane strain"
+mesh = { shape = "rectangle", corner = [0.0, 0.0], size = [0.02, 0.01], divisions = [3, 2], cells = "quad" }
+[bodies.b]
+type = "solid"
+material = "steel"
+model = "plane strain"
+mesh = { shape = "rectangle", corner = [0.0, 0.01], size = [0.02, 0.01], divisions = [7, 2], cells = "quad" }
+[supports.ground]
+at = "a.bottom"
+fixed = ["x", "y"]
+[supports.guide]
+at = "b.top"
+fixed = ["x"]
+[loads.press]
+at = "b.top"
+pressure = 1e6
+[contacts.c]
+slave = "b.bottom"
+master = "a.top"
+stiffness = "rigid"
+friction = { law = "coulomb", coefficient = 0.4 }
+[[phases]]
+name = "press"
+duration = 8e-5
+ramp = 4e-5
+[temporal]
+step = 1e-7
+stepper = "implicit"
+"""
+
+
+def test_bodies_that_touch_but_for_rounding_neither_overlap_nor_are_apart():
+    """Of places on a line at 0.01 m that four nodes weight, some are beside it by a last bit."""
+    case = st.loads(TOUCHING)
+    assert np.array_equal(st.build_system(case).contact_nodes().gap, np.zeros(8))
+    run = st.simulate(case)
+    later = run.time > 4e-5
+    assert run.normal_force[later, 0].mean() == pytest.approx(1e6 * 0.02, rel=0.02)

@@ -166,3 +166,33 @@ def test_matching_meshes_are_tied_node_to_node() -> None:
         system = st.build_system(loads(text))
         entries = system.solids[1].rows.free.data
         assert np.all(entries == 1.0)
+
+
+DISC = """
+[bodies.{0}]
+type = "solid"
+material = "steel"
+model = "3d"
+mass = "consistent"
+mesh = {{ shape = "disc", centre = [0.0, 0.0, 0.0], inner_radius = {1}, outer_radius = {2}, thickness = 0.02, divisions = {3}, cells = "{4}" }}
+"""
+
+
+@pytest.mark.parametrize("cells", ["hexahedron20", "tetra10", pytest.param("hexahedron27", marks=pytest.mark.slow)])
+def test_discs_of_other_divisions_are_one_disc(cells: str) -> None:
+    """Ties on quadratic faces of 36° and 45°, whose middles lie on each other where no facet between their nodes does:
+    no worse than one disc as coarse as the coarser side, against a fine one."""
+    def omegas(text: str) -> np.ndarray:
+        system = st.build_system(loads(STEEL + text))
+        found = spl.eigsh(system.stiffness.tocsc(), 14, system.mass.tocsc(), sigma=-1e6, return_eigenvectors=False)
+        return np.sqrt(np.abs(np.sort(found)))
+
+    exact = omegas(DISC.format("whole", 0.03, 0.09, "[4, 24, 1]", "hexahedron20"))[6:]
+    coarse = omegas(DISC.format("whole", 0.03, 0.09, "[2, 8, 1]", cells))[6:]
+    for slave, master in (("b.inner", "a.outer"), ("a.outer", "b.inner")):
+        text = DISC.format("a", 0.03, 0.06, "[1, 10, 1]", cells) + DISC.format("b", 0.06, 0.09, "[1, 8, 1]", cells)
+        two = omegas(text + f'[ties.glue]\nslave = "{slave}"\nmaster = "{master}"\n')
+        # Turning strains a little what two parabolas through other nodes of a circle are apart.
+        assert two[:6].max() < 3e-3 * two[6]
+        assert np.all(two[6:] - exact < 1.02 * (coarse - exact))
+        assert np.all(two[6:] > exact * (1.0 - 1e-4))

@@ -168,7 +168,7 @@ class FacetSurface:
             facet, local = np.zeros(len(slaves), dtype=np.int64), np.zeros((len(slaves), 2))
             inside, again = np.zeros(len(slaves), dtype=bool), np.arange(len(slaves))
         if len(again):
-            starts = self._nearest_facets(slaves[again], current)
+            starts = self.nearest_facets(slaves[again], current)
             facet[again], local[again], inside[again] = self._search(slaves[again], current, normals, starts)
         return self._location(slaves, current, normals, facet, local, inside)
 
@@ -179,9 +179,13 @@ class FacetSurface:
         found = locate_all(slaves, current, self.facets, normals, self.neighbours, blocked, starts)
         return found[0], found[1], found[2]
 
-    def _nearest_facets(self, slaves: Array, current: Array) -> IntArray:
-        """Facets (m, q) to begin with: those whose centre, or points between centre and edges, are nearest, and both at
-        the nearest sharp edge, over which no search goes: beside narrow ones a large one's centre is far."""
+    def nearest_facets(self, slaves: Array, current: Array | None = None) -> IntArray:
+        """Facets (m, q) to begin a search at from positions (m, 3) [m], nodes at ``current`` (k, 3) [m] or undisplaced.
+
+        Those whose centre, or points between centre and edges, are nearest, and both at the nearest sharp edge, over
+        which no search goes: beside narrow ones a large one's centre is far.
+        """
+        current = self.positions if current is None else current
         valid = self.facets >= 0
         middles = 0.5 * (current[self.facets] + current[np.take_along_axis(self.facets, _following(self.facets), 1)])
         centres = np.sum(current[self.facets] * valid[..., None], axis=1) / valid.sum(axis=1, keepdims=True)

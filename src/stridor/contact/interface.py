@@ -16,6 +16,8 @@ from ..laws.friction import FrictionLaw
 from ..typing import Array, Sparse
 from .surface import project, spline_weights, unit_tangent
 
+ROUNDING = 1e-12  # of the coordinates that a gap is the difference of
+
 
 @dataclass(frozen=True)
 class Rows:
@@ -69,6 +71,17 @@ class Contact:
     def compliance(self) -> float:
         """1/K_c [m/N], 0 for rigid contact."""
         return 1.0 / self.stiffness
+
+
+def rounding_of(*coordinates: Array) -> float:
+    """How far [m] differences of coordinates [m] are uncertain."""
+    return ROUNDING * max(float(np.max(np.abs(numbers), initial=0.0)) for numbers in coordinates)
+
+
+def without_rounding(gap: Array, *coordinates: Array) -> Array:
+    """Gaps (m,) [m], zero where no more than the rounding of the coordinates [m] that they are made of: bodies that
+    were placed to touch do so, neither open nor closed too far by the last bit."""
+    return np.where(np.abs(gap) <= rounding_of(*coordinates), 0.0, gap)
 
 
 def pair(
@@ -133,7 +146,7 @@ def pair(
         segment=segment,
         xi=xi,
         side=side,
-        gap=float(normal @ (slave_position - point)),
+        gap=float(without_rounding(normal @ (slave_position - point), slave_position, master_positions)),
         normal=normal,
         tangent=tangent,
         normal_row=normal_row,

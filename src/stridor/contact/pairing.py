@@ -17,7 +17,7 @@ from ..typing import Array, BoolArray, IntArray
 from .coupling import SlaveFacets, coupled
 from .curve import Curve
 from .facets import FacetSurface
-from .interface import Rows
+from .interface import Rows, rounding_of, without_rounding
 from .joined import joined
 from .master import Location, MasterSurface
 from .pieces import OPPOSED
@@ -99,6 +99,7 @@ def pair_surface(
         position = position - moved[:, None] * location.normal
         location = replace(location, gap=location.gap - moved)
     coupling = coupled(around, position, area, location, master)
+    coupling = replace(coupling, gap=without_rounding(coupling.gap, position, *_placing(master)))
     one = joined(freedoms[facing], location.normal, repeats) if freedoms is not None and len(repeats) else None
     if one is not None:
         location = one.even(location, coupling.area)
@@ -258,8 +259,7 @@ def overlap_tolerance(position: Array, normals: Array, master: MasterSurface) ->
     position (m, d), normals (m, d): the slave nodes, whose chords are taken between nearest neighbours.
     """
     rounding = 1e-9 * float(np.linalg.norm(np.ptp(position, axis=0)))
-    rounding += 1e-12 * float(np.abs(position).max(initial=0.0))
-    rounding = max(rounding, *(1e-12 * float(np.max(np.abs(numbers), initial=0.0)) for numbers in _placing(master)))
+    rounding = max(rounding + rounding_of(position), rounding_of(*_placing(master)))
     height = float(getattr(master, "chord_height", 0.0))
     count = min(len(position), 2 * position.shape[1] - 1)
     if count > 1:

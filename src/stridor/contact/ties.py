@@ -17,10 +17,12 @@ import scipy.sparse as sp
 from ..errors import CaseError
 from ..typing import Array, BoolArray, IntArray, Sparse
 from .curve import Curve
+from .facets import FacetSurface
+from .interpolation import LINEAR
 from .master import MasterSurface
+from .projection import line3, nearest_on_faces, project_on_lines
 
 CANDIDATES = 3
-PROJECTION_STEPS = 30
 CHAIN_DOUBLINGS = 12
 SAME = 1e-6  # difference of weights that two bonds of one node may have: rounding of mesh files
 _SAME_DIRECTION = 0.5  # cosine between outward normals above which surfaces do not face each other
@@ -75,8 +77,8 @@ class Bond:
 def tie(slave_points: Array, master: MasterSurface, *, where: str, tolerance: float) -> NodeTies:
     """Places of slave points (s, d) [m] on the undisplaced master, as its facets interpolate.
 
-    On a Curve the facets themselves count, straight or quadratic, not the spline through their nodes; on a
-    FacetSurface the linear facets that it is split into. Raises CaseError naming ``where`` for a slave point
+    The facets themselves count, straight or quadratic, not the spline through their nodes nor the linear facets that
+    they are split into. Raises CaseError naming ``where`` for a slave point
     farther than ``tolerance`` [m] from the master, over its edges included, and for a master without nodes.
     """
     if master.node_count == 0:
@@ -86,6 +88,8 @@ def tie(slave_points: Array, master: MasterSurface, *, where: str, tolerance: fl
     else:
         location = master.locate(slave_points)
         nodes, weights = location.nodes, location.weights
+        if isinstance(master, FacetSurface) and not set(master.kinds) <= set(LINEAR):
+            nodes, weights = nearest_on_faces(slave_points, master, location.facet)
         # Not the location's point: of sharp edges and corners that one belongs to the gap, this one to the weights.
     positions = _positions(master)
     point = np.einsum("sr,srd->sd", weights, positions[nodes])
@@ -244,13 +248,13 @@ def _on_lines(points: Array, curve: Curve) -> tuple[IntArray, Array]:
     count = min(CANDIDATES, len(corners))
     nearest = np.concatenate([_nearest_chords(part, corners, count) for part in _portions(points, len(corners))])
     facets = corners[nearest]  # (s, q, 3, d)
-    xi = _project(points[:, None, :], facets)
-    distance = np.linalg.norm(np.einsum("sqr,sqrd->sqd", _line3(xi), facets) - points[:, None, :], axis=2)
+    xi = project_on_lines(points[:, None, :], facets)
+    distance = np.linalg.norm(np.einsum("sqr,sqrd->sqd", line3(xi), facets) - points[:, None, :], axis=2)
     best = np.argmin(distance, axis=1)
     each = np.arange(len(points))
     facet, local = nearest[each, best], xi[each, best]
     linear = np.stack([1.0 - local, local, np.zeros_like(local)], axis=1)
-    weights = np.where(quadratic[facet][:, None], _line3(local), linear)
+    weights = np.where(quadratic[facet][:, None], line3(local), linear)
     weights[np.abs(weights) < 1e-12] = 0.0
     return np.where(weights == 0.0, 0, curve.facets[facet]), weights
 
@@ -269,26 +273,3 @@ def _nearest_chords(points: Array, corners: Array, count: int) -> IntArray:
         part = np.clip(np.sum(offset * along, axis=2) / np.sum(along**2, axis=1), 0.0, 1.0)
         squared = np.minimum(squared, np.sum((offset - part[..., None] * along) ** 2, axis=2))
     return np.argsort(squared, axis=1)[:, :count]
-
-
-def _project(points: Array, facets: Array) -> Array:
-    """ξ (s, q) in [0, 1] of the nearest points on quadratic lines (s, q, 3, d), by Newton's method."""
-    start, end, middle = facets[..., 0, :], facets[..., 1, :], facets[..., 2, :]
-    along, bend = end - start, 2.0 * (start + end) - 4.0 * middle
-    xi = np.clip(np.sum((points - start) * along, axis=-1) / np.sum(along**2, axis=-1), 0.0, 1.0)
-    for _ in range(PROJECTION_STEPS):
-        offset = points - np.einsum("sqr,sqrd->sqd", _line3(xi), facets)
-        slope = along + (2.0 * xi[..., None] - 1.0) * bend
-        square = np.sum(slope**2, axis=-1)
-        bent = np.maximum(square - 2.0 * np.sum(offset * bend, axis=-1), 0.1 * square)
-        new = np.clip(xi + np.sum(offset * slope, axis=-1) / bent, 0.0, 1.0)
-        moved = float(np.abs(new - xi).max(initial=0.0))
-        xi = new
-        if moved < 1e-14:
-            break
-    return xi
-
-
-def _line3(xi: Array) -> Array:
-    """Shape functions (…, 3) of first, last and middle node of a quadratic line on [0, 1]."""
-    return np.stack([(1.0 - xi) * (1.0 - 2.0 * xi), xi * (2.0 * xi - 1.0), 4.0 * xi * (1.0 - xi)], axis=-1)

@@ -177,10 +177,10 @@ def _contacts(model: ExportedModel) -> str:
     axes = _AXES[: model.dimension]
     rows = (
         [k, c.contact, "rigid" if math.isinf(c.stiffness) else repr(c.stiffness), repr(c.coefficient), repr(c.gap),
-         *_place(c.place, model.dimension)]
+         *_place(c.place, model.dimension), -1 if c.pulls else 1]
         for k, c in enumerate(model.contacts, start=1)
     )  # fmt: skip
-    return _table(["number", "contact", "stiffness_n_m", "friction_coefficient", "gap_m", *axes], rows)
+    return _table(["number", "contact", "stiffness_n_m", "friction_coefficient", "gap_m", *axes, "force_sign"], rows)
 
 
 def _case(work: Workspace, model: ExportedModel, form: Format) -> str:

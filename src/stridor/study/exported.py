@@ -19,9 +19,12 @@ import scipy.sparse as sp
 from ..errors import AnalysisError, CaseError
 from ..matrices.model import Role
 from ..modal.krylov.problem import ContactProblem, problem_of
+from ..modal.krylov.steady import touching_nodes
+from ..modal.options import Options
 from ..sliding import anything_acts, full_motion
+from ..sliding.pressing import pulled
 from ..system import System
-from ..typing import Array, IntArray, Sparse
+from ..typing import Array, BoolArray, IntArray, Sparse
 from .asked import require_friction
 from .pencil import pencil
 from .workspace import Problem, Workspace
@@ -59,13 +62,15 @@ class Freedom:
 @dataclass(frozen=True)
 class ContactRow:
     """A row of ``normal`` and its rows of ``tangent``: contact, stiffness [N/m] (inf: rigid), own friction coefficient
-    at its slip speed, gap [m] of the structure at rest, place (d numbers) [m]."""
+    at its slip speed, gap [m] of the structure at rest, place (d numbers) [m], and whether the contact, kept closed,
+    pulls there: friction, which goes with the size of the force, then turns its sign with respect to the gap."""
 
     contact: str
     stiffness: float
     coefficient: float
     gap: float
     place: tuple[float, ...]
+    pulls: bool
 
 
 @dataclass(frozen=True)
@@ -116,12 +121,12 @@ def exported_model(problem: Problem, mu: float | None = None) -> ExportedModel:
         notes = (*notes, contact.contact_state)
     loads = [sp.csr_array(force[:, None]) for force in system.loads.values()]
     columns = sp.csr_array(sp.hstack(loads)) if loads else sp.csr_array((system.size, 0))
-    sliding = len(contact.touching)
+    sliding, pulls = len(contact.touching), _pulls(system, mu, contact, options)
     return ExportedModel(
         terms=terms,
         normal=contact.normal[:sliding],
-        tangent=_tangent(system, contact),
-        contacts=_contact_rows(system, contact),
+        tangent=_tangent(system, contact, pulls),
+        contacts=_contact_rows(system, contact, pulls),
         loads=sp.csr_array(sp.vstack([columns, sp.csr_array((beyond, columns.shape[1]))])),
         load_names=tuple(system.loads),
         freedoms=_freedoms(work, system, contact, beyond),
@@ -214,11 +219,22 @@ def _turned(one: Sparse, other: Sparse) -> int:
     return int(np.count_nonzero(along < 0.0))
 
 
-def _tangent(system: System, contact: ContactProblem) -> Sparse:
+def _pulls(system: System, mu: float | None, contact: ContactProblem, options: Options) -> BoolArray:
+    """Which touching nodes (m,) are kept closed and pull."""
+    nodes = system.contact_nodes()
+    force = touching_nodes(system, nodes, mu, options.solver).force
+    pulling = np.zeros(nodes.count, dtype=bool) if force is None else nodes.kept & pulled(force)
+    return pulling[contact.touching]
+
+
+def _tangent(system: System, contact: ContactProblem, pulls: BoolArray) -> Sparse:
     """Rows (m, n) of the touching nodes along their slip, of those without friction too."""
     nodes = system.contact_nodes().select(contact.touching)
-    rows = sp.csr_array(-contact.slide[: nodes.count])
     without = nodes.share == 0.0
+    # The problem's own rows are those that friction goes along with the force as it is: against the slip where it
+    # pushes, with the slip where it pulls.
+    sign = np.where(without, 0.0, np.where(pulls, 1.0, -1.0))
+    rows = sp.csr_array(sp.diags_array(sign) @ contact.slip[: nodes.count])
     if not without.any():
         return rows
     slip = nodes.slip_velocity(full_motion(system))
@@ -227,7 +243,7 @@ def _tangent(system: System, contact: ContactProblem) -> Sparse:
     return sp.csr_array(rows + nodes.along(way))
 
 
-def _contact_rows(system: System, contact: ContactProblem) -> tuple[ContactRow, ...]:
+def _contact_rows(system: System, contact: ContactProblem, pulls: BoolArray) -> tuple[ContactRow, ...]:
     nodes = system.contact_nodes().select(contact.touching)
     if not nodes.count:
         return ()
@@ -238,7 +254,7 @@ def _contact_rows(system: System, contact: ContactProblem) -> tuple[ContactRow, 
     return tuple(
         ContactRow(
             nodes.names[int(nodes.owner[k])], float(stiffness[k]), float(coefficients[k]), float(nodes.gap[k]),
-            tuple(nodes.position[k].tolist()),
+            tuple(nodes.position[k].tolist()), bool(pulls[k]),
         )
         for k in range(nodes.count)
     )  # fmt: skip

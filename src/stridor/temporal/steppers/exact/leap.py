@@ -27,6 +27,7 @@ from .tables import (
     IMAG,
     LONGEST,
     MEANINGS,
+    NUMBER_AMOUNTS,
     NUMBER_SLOW,
     POLES,
     RATE_IMAG,
@@ -116,13 +117,15 @@ def _look(
 ) -> bool:  # pragma: no cover - compiled
     """Find what comes next; whether that can be told. Where it is a change of contact, modes there are ``ahead``."""
     times, counts = state.times, state.counts
-    rows = matrix(store, where, NUMBER_SLOW)
-    slow = np.zeros((rows.shape[0], terms.shape[0]))
+    rows, parts = matrix(store, where, NUMBER_SLOW), matrix(store, where, NUMBER_AMOUNTS)
+    slow, amounts = np.zeros((rows.shape[0], terms.shape[0])), np.zeros(rows.shape[0])
     for i in range(rows.shape[0]):
         product(terms, rows[i], slow[i])
+        for s in range(terms.shape[1]):
+            amounts[i] += parts[i, s] * abs(terms[0, s])
     numbers = Numbers(
         matrix(store, where, REAL), matrix(store, where, IMAG), matrix(store, where, RATE_REAL),
-        matrix(store, where, RATE_IMAG), matrix(store, where, SIZES), slow,
+        matrix(store, where, RATE_IMAG), matrix(store, where, SIZES), slow, amounts,
     )  # fmt: skip
     table = Parts(
         matrix(store, where, LONGEST)[0, 0], matrix(store, where, TURN_REAL), matrix(store, where, TURN_IMAG),

@@ -176,8 +176,8 @@ class Leaps:
         meanings = np.array([[MEANING[what], c] for what, c in watched.meanings], dtype=float).reshape(-1, 2)
         observed = self.outputs.observed(watched)
         return leg_parts(
-            watched.flow, watched.numbers, watched.slow, meanings, watched.table, forms_of(watched.flow),
-            observed.modes, observed.slow, self.every * self.step,
+            watched.flow, watched.numbers, watched.slow, watched.slow_sizes, meanings, watched.table,
+            forms_of(watched.flow), observed.modes, observed.slow, self.every * self.step,
         )  # fmt: skip
 
 

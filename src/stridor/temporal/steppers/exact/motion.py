@@ -15,7 +15,7 @@ from .decisions import CLOSE, EventState, Impact, Touching, choices, consistent_
 from .drive import Piece
 from .leap import MOMENT, PLAIN, STRETCH
 from .search import CROSSED, UNDECIDED, Numbers, Parts, first_root, numbers_of, parts_of, planes
-from .statuses import BACKWARD, FORWARD, GAP, STICK, TAYLOR, Driven, Flow, Pairs, Regime, Status, sense
+from .statuses import BACKWARD, FORWARD, GAP, STICK, TAYLOR, Driven, Flow, Pairs, Regime, Row, Status, sense
 
 UNTOLD = (
     "a force, gap or slip of a contact stays so close to zero that no change of status can be told from rounding, "
@@ -30,13 +30,15 @@ LANDINGS = ((PLAIN, 1e-4), (100, 1e-2))
 
 @dataclass(frozen=True)
 class Watched:
-    """A flow with the numbers that end it: for each what it means and of which contact; tables of the search."""
+    """A flow with the numbers that end it: for each what it means and of which contact, its weights on what is slow and
+    what these are the sums of (m, S), by which rounding is judged; tables of the search."""
 
     flow: Flow
     meanings: tuple[tuple[str, int], ...]
     weights: ComplexArray
     numbers: Numbers
     slow: Array
+    slow_sizes: Array
     table: Parts
 
 
@@ -139,7 +141,10 @@ class Motion:
             last = self.pieces[self.piece].end
             limit = min(anchor.span, last - anchor.time)
             code, which, after, level, _, unsure = first_root(
-                anchor.watched.numbers._replace(rows=anchor.watched.slow @ anchor.terms.T),
+                anchor.watched.numbers._replace(
+                    rows=anchor.watched.slow @ anchor.terms.T,
+                    amounts=anchor.watched.slow_sizes @ np.abs(anchor.terms[0]),
+                ),
                 planes(anchor.watched.flow.split.poles), planes(anchor.zeta), anchor.watched.table, limit,
                 self.level, np.empty(2 * len(anchor.zeta)),
             )  # fmt: skip
@@ -356,35 +361,35 @@ def _watched(regime: Regime, piece: Piece) -> Watched:
     meanings: list[tuple[str, int]] = []
     weights: list[ComplexArray] = []
     slow: list[Array] = []
+    sizes: list[Array] = []
     for c, now in enumerate(regime.status):
         normal, tangential = flow.forces[c]
-        rows = []
+        rows: list[tuple[str, tuple[Row, ...]]] = []
         if now == GAP:
-            rows = [("closes", flow.gap(c))]
+            rows = [("closes", (flow.gap(c),))]
         elif now == STICK:
-            limit = pairs.sticking[c]
-            for name, sign in (("slips forward", 1.0), ("slips backward", -1.0)):
-                # What holds a slave back that would go forward acts against the tangent.
-                rows.append((name, type(normal)(*(limit * n + sign * t for n, t in zip(
-                    (normal.q, normal.v, normal.p), (tangential.q, tangential.v, tangential.p), strict=True
-                )))))  # fmt: skip
+            # What holds a slave back that would go forward acts against the tangent.
+            limit = normal.times(pairs.sticking[c])
+            rows = [("slips forward", (limit, tangential)), ("slips backward", (limit, tangential.times(-1.0)))]
         else:
             slip = flow.slip(c)
             s = sense(now)
-            rows = [("opens", normal)]
+            rows = [("opens", (normal,))]
             # Slip that other contacts hold, or that nothing hangs on, ends with none of these.
             free = np.linalg.norm(regime.free[0].T @ slip.v) > HELD * np.linalg.norm(slip.v)
             if free and pairs.sticking[c] > 0.0:
-                rows.append(("stops", type(slip)(s * slip.q, s * slip.v, s * slip.p)))
-        for name, row in rows:
-            weight, rest = flow.signal(row)
+                rows.append(("stops", (slip.times(s),)))
+        for name, parts in rows:
+            weight, rest = flow.signal(parts[0] if len(parts) == 1 else parts[0].plus(parts[1]))
             meanings.append((name, c))
             weights.append(weight)
             slow.append(rest)
+            # Of both: a limit and a force that are equal leave nothing, but their rounding.
+            sizes.append(sum((flow.sizes_of(part) for part in parts), np.zeros(len(flow.slow))))
     poles = flow.split.poles
     slowest = float(np.abs(poles).min(initial=np.inf))
     longest = min(1.0 / slowest if np.isfinite(slowest) else np.inf, piece.end - piece.start)
     stacked = np.array(weights, dtype=complex).reshape(len(meanings), len(poles))
-    rest = np.array(slow).reshape(len(meanings), len(flow.slow))
+    rest, amounts = (np.array(lot).reshape(len(meanings), len(flow.slow)) for lot in (slow, sizes))
     numbers = numbers_of(stacked, poles, rest)
-    return Watched(flow, tuple(meanings), stacked, numbers, rest, parts_of(poles, longest))
+    return Watched(flow, tuple(meanings), stacked, numbers, rest, amounts, parts_of(poles, longest))

@@ -41,7 +41,8 @@ class Parts(NamedTuple):
 
 class Numbers(NamedTuple):
     """Terms of several numbers: real and imaginary weights (m, f) of the modes, those of their rates, their sizes,
-    polynomials (m, J)."""
+    polynomials (m, J), and what the terms of their first coefficients amount to (m,), by which rounding is judged:
+    these may be differences of much larger ones."""
 
     real: Array
     imag: Array
@@ -49,6 +50,7 @@ class Numbers(NamedTuple):
     rate_imag: Array
     sizes: Array
     rows: Array
+    amounts: Array
 
 
 def planes(values: ComplexArray) -> Array:
@@ -60,8 +62,9 @@ def numbers_of(weights: ComplexArray, poles: ComplexArray, rows: Array) -> Numbe
     """Numbers with weights (m, f) of modes λ (f,) and polynomials (m, J)."""
     turning = weights * poles
     return Numbers(
-        weights.real.copy(), weights.imag.copy(), turning.real.copy(), turning.imag.copy(), np.abs(weights), rows
-    )
+        weights.real.copy(), weights.imag.copy(), turning.real.copy(), turning.imag.copy(), np.abs(weights), rows,
+        np.abs(rows[:, :1]).sum(axis=1),
+    )  # fmt: skip
 
 
 def parts_of(poles: ComplexArray, longest: float) -> Parts:
@@ -198,7 +201,7 @@ def _root(
     its second number [s]: Newton's method, kept between; ends: values and rates there; modes (2f,): those at the
     root."""
     time, length = span
-    real, imag, rate_real, rate_imag, sizes, rows = numbers
+    real, imag, rate_real, rate_imag, sizes, rows, _ = numbers
     low, high = 0.0, length
     t = _guess(length, (ends[0] + let, ends[1], ends[2] + let, ends[3]))
     noise = abs(rows[i, 0])
@@ -239,7 +242,7 @@ def first_root(
     what ended it, which number, when, the level of the last part, how many parts there were, and how many of the finest
     could not be decided; ``modes`` (2f,) are [Re; Im] of those at the root.
     """
-    real, imag, rate_real, rate_imag, sizes, rows = numbers
+    real, imag, rate_real, rate_imag, sizes, rows, summed = numbers
     longest, turn_real, turn_imag, bent, turned = table
     m, f = real.shape
     here, following, amounts = np.empty(2 * f), np.empty(2 * f), np.empty(f)
@@ -252,7 +255,7 @@ def first_root(
         y, slope = polynomial(rows, i, 0.0)
         of_modes, turning = number_at(real, imag, rate_real, rate_imag, i, here)
         now[i], rate[i] = y + of_modes, slope + turning
-        size = LET_GO * abs(rows[i, 0])
+        size = LET_GO * summed[i]
         for k in range(f):
             size += LET_GO * sizes[i, k] * math.hypot(here[k], here[f + k])
         if now[i] < size:

@@ -76,6 +76,14 @@ class Row:
         """Its value."""
         return float(self.q @ q + self.v @ v + self.p @ p)
 
+    def times(self, factor: float) -> Row:
+        """A multiple of it."""
+        return Row(factor * self.q, factor * self.v, factor * self.p)
+
+    def plus(self, other: Row) -> Row:
+        """The sum of both."""
+        return Row(self.q + other.q, self.v + other.v, self.p + other.p)
+
     def size(self, q: Array, v: Array, p: Array) -> float:
         """The sum of what its terms amount to, by which rounding is judged."""
         return float(np.abs(self.q) @ np.abs(q) + np.abs(self.v) @ np.abs(v) + np.abs(self.p) @ np.abs(p))
@@ -383,6 +391,13 @@ class Flow(Driven):
         slow = row.q @ self.rest_q + row.v @ self.rest_v
         slow[len(slow) - len(row.p) :] += row.p
         return row.q @ self.modes_q + row.v @ self.modes_v, slow
+
+    def sizes_of(self, row: Row) -> Array:
+        """What the terms of a number on what is slow (z + P,) amount to."""
+        _, (rest_q, rest_v) = self._amounts
+        slow = np.abs(row.q) @ rest_q + np.abs(row.v) @ rest_v
+        slow[len(slow) - len(row.p) :] += np.abs(row.p)
+        return slow
 
     def series(self, slow: Array) -> Array:
         """Terms (TAYLOR, z + P) of what is slow in powers of the time [s]."""

@@ -20,9 +20,9 @@ from .statuses import Driven, Flow, Row
 (
     ENTER, REST, SLOW, POLES, REAL, IMAG, RATE_REAL, RATE_IMAG, SIZES, NUMBER_SLOW, MEANINGS, TURN_REAL, TURN_IMAG,
     BENT, TURNED, STATE, STATE_SLOW, AMOUNTS, AMOUNTS_SLOW, OBSERVED, OBSERVED_SLOW, OBSERVED_SIZES, OBSERVED_RATE,
-    WHICH, QUADRATIC, CROSS_REAL, CROSS_IMAG, FORM_SLOW, STILL, RECORD_TURN, LONGEST,
-) = range(31)  # fmt: skip
-LEG = 31
+    WHICH, QUADRATIC, CROSS_REAL, CROSS_IMAG, FORM_SLOW, STILL, RECORD_TURN, LONGEST, NUMBER_AMOUNTS,
+) = range(32)  # fmt: skip
+LEG = 32
 # Of an option, rows on [q; v; p]: forces (2m, ·) normal and tangential by turns, the rates of slips and of openings,
 # gaps and openings (m, ·).
 FORCES, SLIP_RATE, OPENING_RATE, GAPS, OPENINGS = range(5)
@@ -61,8 +61,8 @@ class Store:
 
 
 def leg_parts(
-    flow: Flow, numbers: Numbers, number_slow: Array, meanings: Array, table: Parts, forms: Forms,
-    observed: ComplexArray, slow: Array, between: float,
+    flow: Flow, numbers: Numbers, number_slow: Array, number_amounts: Array, meanings: Array, table: Parts,
+    forms: Forms, observed: ComplexArray, slow: Array, between: float,
 ) -> list[Array]:  # fmt: skip
     """The matrices of a leg in order; observed (o, f), slow (o, S): what is recorded; between [s]: two records."""
     split, z = flow.split, flow.z
@@ -88,7 +88,7 @@ def leg_parts(
         WHICH: forms.which[None], QUADRATIC: forms.quadratic,
         CROSS_REAL: forms.cross_real, CROSS_IMAG: forms.cross_imag, FORM_SLOW: forms.slow, STILL: forms.still,
         RECORD_TURN: np.stack([turn.real, turn.imag]),
-        LONGEST: np.array([[table.longest]]),
+        LONGEST: np.array([[table.longest]]), NUMBER_AMOUNTS: number_amounts,
     }  # fmt: skip
     return [found[item] for item in range(LEG)]
 
