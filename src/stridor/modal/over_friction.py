@@ -177,13 +177,14 @@ def onsets_of_band(
     *,
     damped: bool = True,
     options: Options | None = None,
+    check: bool = True,
 ) -> Onsets:
     """Every onset in a range of μ, as `onsets` solves them and `checked_onsets` completes them, each with the nodes
-    that touch at its μ; where these change, growth may set in or end at once (kind "contact"). They are kept
-    with the system. Raises as `onsets`."""
+    that touch at its μ; where these change, growth may set in or end at once (kind "contact"). check=False leaves
+    `checked_onsets` out, and nothing else. They are kept with the system. Raises as `onsets`."""
     chosen, (low, high) = options or Options(), (float(v) for v in friction_range)
-    asked = ("onsets", low, high, max_frequency_hz, damped, chosen)
-    return system.once(asked, lambda: _solved_onsets(system, (low, high), max_frequency_hz, damped, chosen))
+    asked = ("onsets", low, high, max_frequency_hz, damped, chosen, check)
+    return system.once(asked, lambda: _solved_onsets(system, (low, high), max_frequency_hz, damped, chosen, check))
 
 
 def _shapes_at(
@@ -200,14 +201,16 @@ def _shapes_at(
 
 
 def _solved_onsets(
-    system: System, friction_range: tuple[float, float], max_frequency_hz: float, damped: bool, options: Options
-) -> Onsets:
+    system: System, friction_range: tuple[float, float], max_frequency_hz: float, damped: bool, options: Options,
+    check: bool,
+) -> Onsets:  # fmt: skip
     carried = Carried()
 
     def solved(held: System, between: tuple[float, float], before: Onsets | None = None) -> Onsets:
         # Behind a border branches have the names that they had before it.
         numbered_at = 0.0 if before is None else between[0]
-        carried.at_end = partial(_shapes_at, held, between[1], max_frequency_hz, damped, options)
+        if check:
+            carried.at_end = partial(_shapes_at, held, between[1], max_frequency_hz, damped, options)
         try:
             found = onsets(
                 held, between, max_frequency_hz=max_frequency_hz, damped=damped, numbered_at=numbered_at,
@@ -217,6 +220,8 @@ def _solved_onsets(
             if held.size > WHOLE or options.source is not None:
                 raise
             return unfollowed(held, between, str(error).partition(";")[0])
+        if not found.completeness and not check:
+            return found
         if not found.completeness:
             found = checked_onsets(
                 held, found, damped=damped, options=options, numbered_at=numbered_at, carried=carried,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -23,7 +23,6 @@ from ..interrupts import at_once
 from ..modal.complex_modes import ComplexModes
 from ..modal.full import ParametricOnsets, full_modes, full_onsets
 from ..modal.onsets import Onsets
-from ..modal.onsets import onsets as solve_onsets
 from ..modal.over_friction import modes_of_band, onsets_of_band
 from ..modal.painleve import steps_undetermined
 from ..modal.receptance_modes import prepare
@@ -31,7 +30,6 @@ from ..modal.source import by_receptance, require_full
 from ..sliding import taken_as_closed
 from ..sliding.result import SteadySliding
 from ..sliding.solution import other_equilibria
-from ..sliding.stretches import instead_of_own
 from ..system import System
 from ..temporal.settings import Settings
 from ..temporal.simulate import Checkpoint, Progress, plan
@@ -290,13 +288,11 @@ def found_onsets(
             work.system, between, max_frequency_hz=max_frequency_hz, damped=damped, options=options, own=own
         )
         notes = _held_by_factors(work, own)
-    elif check:
-        result = onsets_of_band(work.system(), between, max_frequency_hz, damped=damped, options=options)
-        notes = (*taken_as_closed(work.system()), *decided_by_meshes(work.system(), solver=options.solver))
     else:
-        held = work.system().touching(instead_of_own(work.system(), *between, solver=options.solver))
-        result = solve_onsets(held, between, max_frequency_hz=max_frequency_hz, damped=damped, **asdict(options))
+        result = onsets_of_band(work.system(), between, max_frequency_hz, damped=damped, options=options, check=check)
         notes = taken_as_closed(work.system())
+        if check:
+            notes = (*notes, *decided_by_meshes(work.system(), solver=options.solver))
     notes = notes if work.varies else (*notes, *work.system().tie_words)
     return replace(result, notes=(*result.notes, *notes, *work.one_for_all))
 

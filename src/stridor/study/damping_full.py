@@ -13,7 +13,6 @@ from ..modal.derivatives import HeldContacts, Mode, PencilChange, by_friction, p
 from ..modal.krylov.steady import touching_nodes
 from ..modal.onsets import Onset
 from ..modal.pencil import Pencil
-from ..sliding.stretches import instead_of_own
 from .analyses import found_onsets
 from .sensitivities import number_at
 from .workspace import Workspace
@@ -51,7 +50,7 @@ class FullSearch:
             return None, ()
         found = LowestOnset(first.mu, first.frequency_hz, residual=first.residual)
         if first.growth_slope is None:
-            return found, ()  # undamped: the onset is an exceptional point
+            return found, ()  # undamped: the onset is an exceptional point; where nodes open or close it is no root
         try:
             slopes = onset_slopes(varied, first, self.paths, self.mu_range)
         except AnalysisError as error:
@@ -76,7 +75,7 @@ def onset_slopes(
 ) -> list[float]:
     """dμ_c/dp of an onset with damping for numbers of the case. Raises AnalysisError where it has no derivative."""
     options, mu = work.options, onset.mu
-    system, held = work.system(mu), _held(work, mu_range)
+    system, held = work.system(mu), _held(work, mu, mu_range)
     pencil = pencil_of(system, mu, held, options)
     lam = 2j * np.pi * onset.frequency_hz
     if not abs(lam):
@@ -92,14 +91,13 @@ def onset_slopes(
     return [-_derivative(work, mode, path, mu, held).real / by_mu for path in paths]
 
 
-def _held(work: Workspace, mu_range: tuple[float, float]) -> HeldContacts:
-    """The nodes that touch where the search for onsets has them touch: in steady sliding with the laws' own friction
-    where there is any, not with that of the onset, which other nodes may do."""
-    at = work.own_friction if work.varies else None
-    at = mu_range[0] if work.varies and at is None else at
+def _held(work: Workspace, mu: float, mu_range: tuple[float, float]) -> HeldContacts:
+    """The nodes that touch where the search for onsets has them touch: in steady sliding at the μ of the onset, of
+    matrices that depend on μ with the laws' own friction."""
+    at = mu
+    if work.varies:
+        at = mu_range[0] if work.own_friction is None else work.own_friction
     system = work.system(at)
-    if not work.varies:
-        at = instead_of_own(system, *mu_range, solver=work.options.solver)
     nodes = system.contact_nodes()
     steady = touching_nodes(system, nodes, at, work.options.solver)
     return HeldContacts(np.flatnonzero(steady.active), steady.sense, steady.stuck, system.size, nodes.count)
