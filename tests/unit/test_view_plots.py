@@ -286,3 +286,16 @@ def test_sweeps_are_drawn_where_some_friction_has_no_modes() -> None:
         assert np.all(np.isfinite([ax.get_ylim() for ax in figure.axes]))
     assert not holes.unstable[-1].any()
     assert len(holes.order(len(holes.mu) - 1)) == 0
+
+
+def test_all_branches_of_a_root_locus_have_the_colours_of_its_bar() -> None:
+    """A branch that is listed at some μ alone, as where other nodes touch, had colours of its own range."""
+    whole = sweep()
+    eigenvalues = whole.eigenvalues.copy()
+    eigenvalues[:40, 2] = complex(np.nan, np.nan)
+    eigenvalues[20:, 0] = complex(np.nan, np.nan)
+    figure = plots.root_locus(replace(whole, eigenvalues=eigenvalues))
+    dots = figure.axes[0].collections
+    assert len(dots) == 3
+    assert {(d.norm.vmin, d.norm.vmax) for d in dots} == {(0.0, 0.2)}
+    assert figure.axes[1].get_ylim() == pytest.approx((0.0, 0.2))

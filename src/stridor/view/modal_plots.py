@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -32,11 +33,13 @@ def root_locus(modes: ComplexModes, *, max_frequency_hz: float | None = None, ax
     figure, ax = panel(ax, 4.4)
     top = _top(modes, max_frequency_hz)
     scatter = None
+    # One scale for all: scatter leaves out what is NaN and would scale each branch by the μ at which it is listed.
+    norm = Normalize(float(modes.mu.min()), float(modes.mu.max()))
     for b in range(len(modes.branch)):
         growth, frequency = modes.growth_rate[:, b], modes.frequency_hz[:, b] / 1e3
         ax.plot(growth, frequency, color="#BBBBBB", linewidth=0.8, zorder=2)
         scatter = ax.scatter(
-            growth, frequency, c=modes.mu, cmap="viridis", s=9, zorder=3, linewidths=0, rasterized=True
+            growth, frequency, c=modes.mu, norm=norm, cmap="viridis", s=9, zorder=3, linewidths=0, rasterized=True
         )
     ax.axvline(0.0, color=INK, linewidth=0.8, zorder=1.5)
     ax.set(xlabel="growth rate Re λ [1/s]   (right of 0: grows)", ylabel="frequency [kHz]", ylim=(0, top / 1e3))
