@@ -299,3 +299,27 @@ def test_all_branches_of_a_root_locus_have_the_colours_of_its_bar() -> None:
     assert len(dots) == 3
     assert {(d.norm.vmin, d.norm.vmax) for d in dots} == {(0.0, 0.2)}
     assert figure.axes[1].get_ylim() == pytest.approx((0.0, 0.2))
+
+
+def test_energies_have_a_unit_of_their_size() -> None:
+    """1e5 mJ had a common factor, which lay below the legend."""
+    run = trajectory()
+    for factor, unit in ((100.0, "J"), (1e-3, "mJ"), (1e-7, "nJ")):
+        works = {name: factor * work for name, work in run.works.items()}
+        grown = replace(run, works=works, kinetic=factor * run.kinetic, elastic=factor * run.elastic)
+        above = plots.energy_plot(grown, balance(grown)).axes[0]
+        assert above.get_ylabel() == f"energy [{unit}]"
+        loads = next(line for line in above.lines if line.get_label() == "put in by loads")
+        in_joules = {"J": 1.0, "mJ": 1e-3, "nJ": 1e-9}[unit] * np.asarray(loads.get_ydata())
+        assert in_joules == pytest.approx(np.interp(loads.get_xdata(), run.time, works["external"]))
+
+
+
+def test_a_common_factor_of_an_axis_is_beside_the_legend_above_it() -> None:
+    run = trajectory()
+    figure = plots.contact_force_and_velocity(replace(run, normal_force=1e7 * run.normal_force), (0.1, 0.11))
+    figure.savefig(io.BytesIO(), format="png", dpi=100)
+    above = figure.axes[0]
+    factor = above.yaxis.get_offset_text()
+    assert factor.get_text() == "1e8"
+    assert not factor.get_window_extent().overlaps(above.get_legend().get_window_extent())

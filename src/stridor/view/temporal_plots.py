@@ -19,6 +19,7 @@ from ..typing import Array
 from .colours import BLUE, COLOURS, GREEN, GREY, INK, ORANGE, PURPLE, SKY, STATUS_COLOURS, VERMILION
 from .style import (
     draw_history,
+    energy_unit,
     extrema,
     legend_above,
     new_figure,
@@ -268,9 +269,10 @@ def energy_plot(trajectory: Trajectory, balance: EnergyBalance, *, axes: Sequenc
         ("taken out by impacts", works["contact"][step], PURPLE, "--"),
         *((f"put in by {name} forces", works[name][step], ORANGE, "-") for name in ("circulatory",) if name in works),
     )
+    unit, its_name = energy_unit(max(float(np.abs(values).max(initial=0.0)) for _, values, _, _ in curves))
     for name, values, colour, style in curves:
-        above.plot(time, 1e3 * values, style, color=colour, label=name, linewidth=1.3)
-    above.set_ylabel("energy [mJ]")
+        above.plot(time, values / unit, style, color=colour, label=name, linewidth=1.3)
+    above.set_ylabel(f"energy [{its_name}]")
     legend_above(above, columns=3)
     mark_phases(above, trajectory, named=False)
     if len(balance.history) == len(trajectory.time):
