@@ -323,3 +323,20 @@ def test_a_common_factor_of_an_axis_is_beside_the_legend_above_it() -> None:
     factor = above.yaxis.get_offset_text()
     assert factor.get_text() == "1e8"
     assert not factor.get_window_extent().overlaps(above.get_legend().get_window_extent())
+
+
+def test_only_peaks_that_leave_the_frame_are_said_to() -> None:
+    """The largest value may lie inside while a smaller one, below, leaves."""
+    time = np.arange(20_000)
+    force = 20 + 15 * np.sin(HZ * time / 100)
+    for peak, value in ((-30.0, "30"), (90.0, "90")):
+        values = force.copy()
+        values[1234] = peak
+        values[4321] = 38.0 if peak < 0 else 36.0  # inside, or hardly more than what is usual
+        run = replace(trajectory(), normal_force=values[:, None])
+        above = plots.contact_history(run).axes[0]
+        notes = [text.get_text() for text in above.texts if "leave" in text.get_text()]
+        assert notes == [f"single peaks leave the frame, the largest {value}"]
+        low, high = above.get_ylim()
+        assert all(low <= x <= high for x in values if x != peak)
+        assert not low <= peak <= high

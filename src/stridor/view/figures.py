@@ -191,7 +191,9 @@ def temporal_figures(inputs: ReportInputs, window: Window | None) -> Iterator[Re
         yield ReportFigure(
             "energy",
             "Energy balance",
-            "Above: what was put in, what is stored and what was taken out. Below: what is missing in the balance, "
+            "Above: what was put in, what is stored in the bodies and what was taken out. What goes into contacts is "
+            "one sum: what impacts take, and what springs of contacts (of those with a stiffness) store and give back. "
+            "Below: what is missing in the balance, "
             "relative to the largest energy that changed hands.",
             "Energies over time, and the imbalance of the energy balance.",
             plots.energy_plot(run, inputs.energy),

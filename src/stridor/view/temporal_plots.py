@@ -266,7 +266,7 @@ def energy_plot(trajectory: Trajectory, balance: EnergyBalance, *, axes: Sequenc
         ("stored", stored, INK, "-"),
         ("taken out by damping", works["damping"][step], GREEN, "--"),
         ("taken out by friction", works["friction"][step], VERMILION, "--"),
-        ("taken out by impacts", works["contact"][step], PURPLE, "--"),
+        ("into impacts and contact springs", works["contact"][step], PURPLE, "--"),
         *((f"put in by {name} forces", works[name][step], ORANGE, "-") for name in ("circulatory",) if name in works),
     )
     unit, its_name = energy_unit(max(float(np.abs(values).max(initial=0.0)) for _, values, _, _ in curves))
@@ -314,11 +314,15 @@ def _usual_limits(ax: Axes, values: Array, *, around: Array | None = None, symme
         bottom = -top
     ends = float(values.min(initial=0.0)), float(values.max(initial=0.0))
     beyond = 0.3 * (top - bottom)
-    if top <= bottom or (ends[1] <= top + beyond and ends[0] >= bottom - beyond):
+    leaves = ends[0] < bottom - beyond, ends[1] > top + beyond
+    if top <= bottom or not any(leaves):
         return
     margin = (0.08 if around is None else 0.25) * (top - bottom)
-    ax.set_ylim(bottom - margin, top + margin)
-    peak = max(ends, key=abs)
+    low_end, high_end = bottom - margin, top + margin
+    # At an end that no peak leaves by much the frame is wide enough for all that is there.
+    shown = low_end if leaves[0] else min(low_end, ends[0]), high_end if leaves[1] else max(high_end, ends[1])
+    ax.set_ylim(*((-max(-shown[0], shown[1]), max(-shown[0], shown[1])) if symmetric else shown))
+    peak = max((end for end, gone in zip(ends, leaves, strict=True) if gone), key=abs)
     ax.annotate(
         f"single peaks leave the frame, the largest {abs(peak):.3g}",
         (0.995, 0.015),
