@@ -340,3 +340,22 @@ def test_only_peaks_that_leave_the_frame_are_said_to() -> None:
         low, high = above.get_ylim()
         assert all(low <= x <= high for x in values if x != peak)
         assert not low <= peak <= high
+
+
+def test_what_does_not_move_has_no_decibels() -> None:
+    said = "does not move: zero throughout"
+    still = spectrum(np.zeros(256), 1e-5)
+    moving = spectrum(np.sin(np.arange(256.0)), 1e-5)
+    two = plots.spectrum_plot({"held": still, "free": moving})
+    assert [text.get_text() for text in two.axes[0].texts] == [said]
+    assert not two.axes[0].lines
+    assert two.axes[1].lines
+    empty = spectrogram(np.zeros(4000), 1e-5, resolution_hz=500.0)
+    run = trajectory()
+    for figure in (
+        plots.spectrum_plot({"held": still}),
+        plots.spectrogram_plot(empty),
+        plots.acceleration_history(replace(run, acceleration=0 * run.acceleration)),
+    ):
+        assert said in [text.get_text() for text in figure.axes[0].texts]
+        assert not figure.axes[0].images

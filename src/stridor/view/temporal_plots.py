@@ -32,8 +32,9 @@ from .style import (
 )
 from .windows import Window, status_spans
 
-DIRECTIONS = {"x": 0, "y": 1}
+DIRECTIONS = {"x": 0, "y": 1, "z": 2}
 DECIBEL_SPAN = 70.0  # shown below the largest line
+HELD = "does not move: zero throughout"
 USUAL = 99.7  # per cent of a history that its axis must show
 
 
@@ -66,6 +67,8 @@ def acceleration_history(
         ax.legend(loc="upper left")
     else:
         draw_history(ax, time, values, width=0.6)
+    if not values.any():
+        _say(ax, HELD)
     mark_phases(ax, trajectory)
     zero_line(ax)
     ax.set(xlabel="time [s]", ylabel=f"acceleration {direction} [m/s²]")
@@ -96,6 +99,11 @@ def spectrum_plot(
     top = -np.inf
     for index, (name, spec) in enumerate(spectra.items()):
         inside = (spec.frequency_hz > 0) & (spec.frequency_hz <= max_frequency_hz)
+        if not spec.amplitude[inside].any():  # of nothing there are no decibels
+            if ax is None:
+                axes[index].set_title(name, fontsize=9, color=COLOURS[index % len(COLOURS)], pad=3)
+                _say(axes[index], HELD)
+            continue
         level = 20 * np.log10(np.maximum(spec.amplitude[inside], 1e-300))
         top = max(top, float(level.max(initial=-np.inf)))
         colour = COLOURS[index % len(COLOURS)]
@@ -110,9 +118,12 @@ def spectrum_plot(
             _mark_harmonics(each, marked_hz, max_frequency_hz, named=each is axes[0])
     if np.isfinite(top):
         axes[0].set_ylim(top - DECIBEL_SPAN, top + 8)
+    elif ax is not None:
+        _say(ax, HELD)
     axes[-1].set(xlabel="frequency [kHz]", xlim=(0, max_frequency_hz / 1e3))
     if ax is not None:
-        ax.legend()
+        if ax.get_legend_handles_labels()[0]:
+            ax.legend()
     else:
         figure.supylabel(f"amplitude [dB re 1 {unit}]", fontsize=9.5)
     return figure
@@ -131,6 +142,10 @@ def spectrogram_plot(
     figure, ax = panel(ax, 3.6)
     inside = content.frequency_hz <= max_frequency_hz
     amplitude = content.amplitude[inside]
+    if not amplitude.any():
+        ax.set(xlabel="time [s]", ylabel="frequency [kHz]")
+        _say(ax, HELD)
+        return figure
     level = 20 * np.log10(np.maximum(amplitude / largest_of(amplitude), 1e-300))
     time, frequency = start + content.time, content.frequency_hz[inside] / 1e3
     half = 0.5 * float(time[1] - time[0]) if len(time) > 1 else 0.5 / content.resolution_hz
@@ -333,6 +348,11 @@ def _usual_limits(ax: Axes, values: Array, *, around: Array | None = None, symme
         color=GREY,
         bbox={"boxstyle": "round,pad=0.2", "fc": "white", "ec": "none", "alpha": 0.85},
     )
+
+
+def _say(ax: Axes, words: str) -> None:
+    """Words in the middle of a panel that has nothing to show."""
+    ax.text(0.5, 0.6, words, transform=ax.transAxes, ha="center", va="center", color=GREY)
 
 
 def _mark_harmonics(ax: Axes, fundamental: float, top: float, *, named: bool) -> None:
