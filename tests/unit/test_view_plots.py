@@ -12,6 +12,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from benches import paper_case
 from stridor.agreement import Agreement, Comparison, Perturbation
@@ -314,7 +315,6 @@ def test_energies_have_a_unit_of_their_size() -> None:
         assert in_joules == pytest.approx(np.interp(loads.get_xdata(), run.time, works["external"]))
 
 
-
 def test_a_common_factor_of_an_axis_is_beside_the_legend_above_it() -> None:
     run = trajectory()
     figure = plots.contact_force_and_velocity(replace(run, normal_force=1e7 * run.normal_force), (0.1, 0.11))
@@ -340,6 +340,12 @@ def test_only_peaks_that_leave_the_frame_are_said_to() -> None:
         low, high = above.get_ylim()
         assert all(low <= x <= high for x in values if x != peak)
         assert not low <= peak <= high
+    # Zero is no value of a force that stays about 20 N.
+    values = 20 + 1e-3 * np.sin(HZ * time / 100)
+    run = replace(trajectory(), normal_force=values[:, None], slip_speed=-values[:, None])
+    for ax, (low, high) in zip(plots.contact_history(run).axes, ((19.999, 20.001), (-20.001, -19.999)), strict=True):
+        assert not [text for text in ax.texts if "leave" in text.get_text()]
+        assert low - 0.001 < ax.get_ylim()[0] < low < high < ax.get_ylim()[1] < high + 0.001
 
 
 def test_what_does_not_move_has_no_decibels() -> None:
@@ -359,3 +365,24 @@ def test_what_does_not_move_has_no_decibels() -> None:
     ):
         assert said in [text.get_text() for text in figure.axes[0].texts]
         assert not figure.axes[0].images
+
+
+@pytest.mark.parametrize(("count", "unnamed"), [(6, 0), (36, 1)])
+def test_labels_of_onsets_cover_neither_each_other_nor_an_onset(count: int, unnamed: int) -> None:
+    """At the μ from which on other nodes touch several modes begin to grow and others end."""
+    whole, first = sweep(top=1.0), found_onsets().onsets[0]
+    several = ComplexModes(
+        whole.mu, np.tile(whole.eigenvalues, 3), np.arange(1, 10), np.tile(whole.residual, 3), whole.damped
+    )
+    found = tuple(replace(first, mu=0.3 + 0.1 * (k % 3), frequency_hz=3000.0 + 300 * k) for k in range(count))
+    figure = plots.frequency_branches(several, onsets=Onsets(found, (0.0, 1.0), 40e3, True), max_frequency_hz=15e3)
+    figure.savefig(io.BytesIO(), format="png", dpi=figure.dpi)
+    ax = figure.axes[0]
+    boxes = [Text.get_window_extent(text) for text in ax.texts]  # without the lines to the onsets
+    assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
+    at = ax.transData.transform([(onset.mu, onset.frequency_hz / 1e3) for onset in found])
+    assert not any(box.contains(x, y) for box in boxes for x, y in at)
+    words = [text.get_text() for text in ax.get_legend().get_texts()]
+    left = count - len(boxes)
+    assert (left > 0) is bool(unnamed)
+    assert ("onset, solved" + (f" ({left} without room for their values)" if left else "")) in words

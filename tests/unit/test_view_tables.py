@@ -141,9 +141,9 @@ def test_how_long_a_window_is_is_said_as_it_is():
     assert unknown.end - unknown.start + run.sampling == pytest.approx(0.4e-3)
     assert regime_window(replace(run, record_every=4), 5000.0).length == "three periods of 5000 Hz (15 records)"
     inputs = ReportInputs(paper_case(), trajectory=run)
-    assert "over 0.4 ms (40 records) (stick" in _window_caption(inputs)
+    assert "over 0.4 ms (40 records), stick" in _window_caption(inputs)
     growing = replace(inputs, unsaturated=Unsaturated(50.0, 1000.0, None, "slide", None))
-    assert "over three periods of 1000 Hz (stick" in _window_caption(growing)
+    assert "over three periods of 1000 Hz, stick" in _window_caption(growing)
 
 
 def _window_caption(inputs):

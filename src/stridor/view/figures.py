@@ -250,7 +250,7 @@ def _contact_window(inputs: ReportInputs, window: Window) -> Iterator[ReportFigu
     if window.separation_fraction:
         shares.append(f"{100 * window.separation_fraction:.0f} % separation")
     caption = (
-        f"Contact {name} over {window.length} ({window.reason}): normal force up to "
+        f"Contact {name} over {window.length}, {window.reason}: normal force up to "
         f"{measured(window.max_normal_force, 1)} N, slip speed up to {measured(window.max_slip_speed, 3)} m/s, "
         f"{', '.join(shares)}."
     )

@@ -327,10 +327,15 @@ def _usual_limits(ax: Axes, values: Array, *, around: Array | None = None, symme
     if symmetric:
         top = max(top, -bottom)
         bottom = -top
-    ends = float(values.min(initial=0.0)), float(values.max(initial=0.0))
+    ends = float(values.min()), float(values.max())
     beyond = 0.3 * (top - bottom)
     leaves = ends[0] < bottom - beyond, ends[1] > top + beyond
-    if top <= bottom or not any(leaves):
+    if top <= bottom:
+        return
+    if not any(leaves):
+        if not bottom - beyond <= 0.0 <= top + beyond:  # else the line at zero would flatten what swings far from it
+            room = 0.05 * (ends[1] - ends[0])
+            ax.set_ylim(ends[0] - room, ends[1] + room)
         return
     margin = (0.08 if around is None else 0.25) * (top - bottom)
     low_end, high_end = bottom - margin, top + margin
