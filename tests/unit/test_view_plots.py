@@ -12,6 +12,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from benches import paper_case
 from stridor.agreement import Agreement, Comparison, Perturbation
@@ -286,3 +287,102 @@ def test_sweeps_are_drawn_where_some_friction_has_no_modes() -> None:
         assert np.all(np.isfinite([ax.get_ylim() for ax in figure.axes]))
     assert not holes.unstable[-1].any()
     assert len(holes.order(len(holes.mu) - 1)) == 0
+
+
+def test_all_branches_of_a_root_locus_have_the_colours_of_its_bar() -> None:
+    """A branch that is listed at some μ alone, as where other nodes touch, had colours of its own range."""
+    whole = sweep()
+    eigenvalues = whole.eigenvalues.copy()
+    eigenvalues[:40, 2] = complex(np.nan, np.nan)
+    eigenvalues[20:, 0] = complex(np.nan, np.nan)
+    figure = plots.root_locus(replace(whole, eigenvalues=eigenvalues))
+    dots = figure.axes[0].collections
+    assert len(dots) == 3
+    assert {(d.norm.vmin, d.norm.vmax) for d in dots} == {(0.0, 0.2)}
+    assert figure.axes[1].get_ylim() == pytest.approx((0.0, 0.2))
+
+
+def test_energies_have_a_unit_of_their_size() -> None:
+    """1e5 mJ had a common factor, which lay below the legend."""
+    run = trajectory()
+    for factor, unit in ((100.0, "J"), (1e-3, "mJ"), (1e-7, "nJ")):
+        works = {name: factor * work for name, work in run.works.items()}
+        grown = replace(run, works=works, kinetic=factor * run.kinetic, elastic=factor * run.elastic)
+        above = plots.energy_plot(grown, balance(grown)).axes[0]
+        assert above.get_ylabel() == f"energy [{unit}]"
+        loads = next(line for line in above.lines if line.get_label() == "put in by loads")
+        in_joules = {"J": 1.0, "mJ": 1e-3, "nJ": 1e-9}[unit] * np.asarray(loads.get_ydata())
+        assert in_joules == pytest.approx(np.interp(loads.get_xdata(), run.time, works["external"]))
+
+
+def test_a_common_factor_of_an_axis_is_beside_the_legend_above_it() -> None:
+    run = trajectory()
+    figure = plots.contact_force_and_velocity(replace(run, normal_force=1e7 * run.normal_force), (0.1, 0.11))
+    figure.savefig(io.BytesIO(), format="png", dpi=100)
+    above = figure.axes[0]
+    factor = above.yaxis.get_offset_text()
+    assert factor.get_text() == "1e8"
+    assert not factor.get_window_extent().overlaps(above.get_legend().get_window_extent())
+
+
+def test_only_peaks_that_leave_the_frame_are_said_to() -> None:
+    """The largest value may lie inside while a smaller one, below, leaves."""
+    time = np.arange(20_000)
+    force = 20 + 15 * np.sin(HZ * time / 100)
+    for peak, value in ((-30.0, "30"), (90.0, "90")):
+        values = force.copy()
+        values[1234] = peak
+        values[4321] = 38.0 if peak < 0 else 36.0  # inside, or hardly more than what is usual
+        run = replace(trajectory(), normal_force=values[:, None])
+        above = plots.contact_history(run).axes[0]
+        notes = [text.get_text() for text in above.texts if "leave" in text.get_text()]
+        assert notes == [f"single peaks leave the frame, the largest {value}"]
+        low, high = above.get_ylim()
+        assert all(low <= x <= high for x in values if x != peak)
+        assert not low <= peak <= high
+    # Zero is no value of a force that stays about 20 N.
+    values = 20 + 1e-3 * np.sin(HZ * time / 100)
+    run = replace(trajectory(), normal_force=values[:, None], slip_speed=-values[:, None])
+    for ax, (low, high) in zip(plots.contact_history(run).axes, ((19.999, 20.001), (-20.001, -19.999)), strict=True):
+        assert not [text for text in ax.texts if "leave" in text.get_text()]
+        assert low - 0.001 < ax.get_ylim()[0] < low < high < ax.get_ylim()[1] < high + 0.001
+
+
+def test_what_does_not_move_has_no_decibels() -> None:
+    said = "does not move: zero throughout"
+    still = spectrum(np.zeros(256), 1e-5)
+    moving = spectrum(np.sin(np.arange(256.0)), 1e-5)
+    two = plots.spectrum_plot({"held": still, "free": moving})
+    assert [text.get_text() for text in two.axes[0].texts] == [said]
+    assert not two.axes[0].lines
+    assert two.axes[1].lines
+    empty = spectrogram(np.zeros(4000), 1e-5, resolution_hz=500.0)
+    run = trajectory()
+    for figure in (
+        plots.spectrum_plot({"held": still}),
+        plots.spectrogram_plot(empty),
+        plots.acceleration_history(replace(run, acceleration=0 * run.acceleration)),
+    ):
+        assert said in [text.get_text() for text in figure.axes[0].texts]
+        assert not figure.axes[0].images
+
+
+@pytest.mark.parametrize(("count", "unnamed"), [(6, 0), (36, 1)])
+def test_labels_of_onsets_cover_neither_each_other_nor_an_onset(count: int, unnamed: int) -> None:
+    """At the μ from which on other nodes touch several modes begin to grow and others end."""
+    whole, first = sweep(top=1.0), found_onsets().onsets[0]
+    several = ComplexModes(
+        whole.mu, np.tile(whole.eigenvalues, 3), np.arange(1, 10), np.tile(whole.residual, 3), whole.damped
+    )
+    found = tuple(replace(first, mu=0.3 + 0.1 * (k % 3), frequency_hz=3000.0 + 300 * k) for k in range(count))
+    figure = plots.frequency_branches(several, onsets=Onsets(found, (0.0, 1.0), 40e3, True), max_frequency_hz=15e3)
+    figure.savefig(io.BytesIO(), format="png", dpi=figure.dpi)
+    ax = figure.axes[0]
+    boxes = [Text.get_window_extent(text) for text in ax.texts]  # without the lines to the onsets
+    assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
+    at = ax.transData.transform([(onset.mu, onset.frequency_hz / 1e3) for onset in found])
+    assert not any(box.contains(x, y) for box in boxes for x, y in at)
+    words = [text.get_text() for text in ax.get_legend().get_texts()]
+    left = count - len(boxes)
+    assert (left > 0) is bool(unnamed)
+    assert ("onset, solved" + (f" ({left} without room for their values)" if left else "")) in words

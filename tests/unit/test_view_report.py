@@ -26,12 +26,13 @@ from test_view_plots import (
 from benches import paper_case
 from stridor.stages import heard
 from stridor.temporal.signals import spectrogram
-from stridor.view import FrictionCurve, NamedFrequencies, NamedShape, ReportInputs, write_report
+from stridor.view import FrictionCurve, NamedFrequencies, NamedShape, ReportInputs, plots, write_report
 from stridor.view import report as report_module
 from stridor.view.modal_tables import onset_tables
 from stridor.view.page_parts import tidy
 from stridor.view.report import sections
 from stridor.view.tables import quantity
+from stridor.view.temporal_tables import energy_table
 from stridor.view.words import verdict
 from undrawn import nothing_drawn
 
@@ -264,9 +265,17 @@ def test_an_older_page_stays_when_writing_fails(tmp_path, monkeypatch):
 def test_the_verdict_says_no_more_than_was_computed():
     assert verdict(ReportInputs(paper_case())).squeals is None
     calm = verdict(ReportInputs(paper_case(), mu=0.05, modes=sweep(top=0.05)))
-    assert (calm.headline, calm.squeals, calm.agrees) == ("It does not squeal at μ = 0.05", False, None)
+    assert (calm.headline, calm.squeals, calm.agrees) == ("It does not squeal at μ = 0.05 up to 40 kHz", False, None)
     alone = verdict(ReportInputs(paper_case(), mu=0.2, modes=sweep()))
     assert alone.headline == "It may squeal at μ = 0.2, at 8635 Hz"  # in time nobody has looked
+
+
+def test_what_goes_into_contacts_is_not_said_to_be_of_impacts_alone():
+    inputs = full_inputs()
+    rows = [row.cells[0] for row in energy_table(inputs.energy).rows]
+    assert "into impacts and springs of contacts" in rows
+    labels = plots.energy_plot(inputs.trajectory, inputs.energy).axes[0].get_legend().get_texts()
+    assert "into impacts and contact springs" in [text.get_text() for text in labels]
 
 
 def test_chapters_without_content_are_not_there():

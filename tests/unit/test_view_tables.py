@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,12 +13,16 @@ from test_view_plots import agreement, balance, found_onsets, trajectory
 import stridor as st
 from benches import paper_case
 from rubbing_block import rubbing_block
+from stridor.app import pipeline
+from stridor.study.saturation import Unsaturated
+from stridor.view import report as report_module
+from stridor.view.figures import temporal_figures
 from stridor.view.inputs import NamedFrequencies, ReportInputs
 from stridor.view.modal_tables import body_table, coupled_table, frequency_tables, onset_tables
 from stridor.view.surface_figures import surface_table
 from stridor.view.tables import number, paired, percent, same_as_printed, significant
 from stridor.view.temporal_tables import contact_table, energy_table, values_table
-from stridor.view.windows import regime_window, status_spans
+from stridor.view.windows import regime_window, shown_motion, status_spans
 
 PRINTED = paper_case().reference
 
@@ -124,6 +130,25 @@ def test_the_window_is_stick_and_slip_before_the_first_separation():
     assert 0.2 < window.stick_fraction < 0.8
     assert window.separation_fraction == 0.0
     assert "before the first separation" in window.reason
+    assert window.length == "three periods of 1000 Hz"
+
+
+def test_how_long_a_window_is_is_said_as_it_is():
+    """Without a frequency it was called three periods: of a run that still grows it was a quarter of one."""
+    run = trajectory(count=12_000)
+    unknown = regime_window(run, None)
+    assert unknown.length == "0.4 ms (40 records)"
+    assert unknown.end - unknown.start + run.sampling == pytest.approx(0.4e-3)
+    assert regime_window(replace(run, record_every=4), 5000.0).length == "three periods of 5000 Hz (15 records)"
+    inputs = ReportInputs(paper_case(), trajectory=run)
+    assert "over 0.4 ms (40 records), stick" in _window_caption(inputs)
+    growing = replace(inputs, unsaturated=Unsaturated(50.0, 1000.0, None, "slide", None))
+    assert "over three periods of 1000 Hz, stick" in _window_caption(growing)
+
+
+def _window_caption(inputs):
+    figures = temporal_figures(inputs, report_module._window(inputs))
+    return next(figure.caption for figure in figures if figure.name == "contact-window")
 
 
 def test_a_run_shorter_than_the_window_has_none():
@@ -152,3 +177,34 @@ def test_a_point_in_contact_has_no_columns_of_surfaces() -> None:
     assert point.heads == ("contact", "force on the slave [N]", "moment about the origin [N m]")
     face = st.loads(rubbing_block("max_frequency_hz = 15e3"))
     assert surface_table(ReportInputs(face, steady=st.steady_sliding(face))).heads[3:] == ("area [m²]", "largest pressure [MPa]")
+
+
+def test_of_points_that_are_held_there_is_no_spectrum():
+    """Of a point that is held along x there was one at −6000 dB."""
+    run = trajectory()
+    turned = run.acceleration[:, :, ::-1].copy()
+    turned[:, 1] = 0.0
+    held = replace(run, acceleration=turned, velocity=run.velocity[:, :, ::-1])
+    assert shown_motion(held) == (0, "y")
+    asked = SimpleNamespace(run=held, case=paper_case())
+    signals, said = pipeline._signals(asked)
+    assert list(signals["spectra"]) == ["beam1.tip"]
+    assert signals["spectra"]["beam1.tip"].peak()[0] == pytest.approx(1000.0, rel=0.01)
+    assert signals["spectrogram"].amplitude.any()
+    assert "along y" in signals["spectra_of"]
+    assert "velocity along y of beam1.tip" in signals["spectrogram_of"]
+    assert said == (
+        "beam1.tip is held along x: its motion is shown along y.", "beam2.end: no motion along y, and no spectrum of it.",
+    )  # fmt: skip
+    drawn = {figure.name: figure for figure in temporal_figures(ReportInputs(paper_case(), trajectory=held, **signals), None)}
+    assert drawn["acceleration"].caption.startswith("Along y")
+    assert drawn["acceleration"].figure.axes[0].get_ylabel() == "acceleration y [m/s²]"
+
+    nothing = replace(run, acceleration=0.0 * run.acceleration)
+    assert shown_motion(nothing) is None
+    asked.run = nothing
+    assert pipeline._signals(asked) == (
+        {}, ("beam1.tip, beam2.end: held, without any motion in the run; no spectrum is drawn.",)
+    )  # fmt: skip
+    names = [figure.name for figure in temporal_figures(ReportInputs(paper_case(), trajectory=nothing), None)]
+    assert "acceleration" not in names

@@ -37,6 +37,7 @@ from ..temporal.simulate import Progress
 from ..temporal.trajectory import Trajectory
 from ..view.inputs import FrictionCurve, NamedFrequencies, NamedShape, ReportInputs
 from ..view.report import write_report
+from ..view.windows import shown_motion
 from ..view.words import verdict
 
 
@@ -261,6 +262,7 @@ def report_inputs(e: Everything) -> ReportInputs:
     """Everything, sorted into what the report takes."""
     agreement = e.agreement
     shapes = _shapes(e)
+    signals, held = _signals(e)
     return ReportInputs(
         case=e.case,
         system=e.system,
@@ -278,7 +280,7 @@ def report_inputs(e: Everything) -> ReportInputs:
         curve=None if e.curve is None else FrictionCurve(mu=e.curve[1], frequency_hz=e.curve[0]),
         trajectory=e.run,
         energy=None if e.summary is None else e.summary.energy,
-        **_signals(e),
+        **signals,
         **shapes,
         agreement=agreement,
         values=_values(e),
@@ -289,7 +291,7 @@ def report_inputs(e: Everything) -> ReportInputs:
         case_text=e.case.text,
         created=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
         warnings=e.description.warnings,
-        notes=e.notes,
+        notes=(*e.notes, *held),
         shape_vector=e.vector,
         friction_energy=e.energy,
         sensitivities=e.sensitivities,
@@ -298,24 +300,50 @@ def report_inputs(e: Everything) -> ReportInputs:
     )
 
 
-def _signals(e: Everything) -> dict[str, Any]:
-    """Spectra of the accelerations along x and the spectrogram of a velocity, from the last phase."""
+def _signals(e: Everything) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Spectra of the accelerations and the spectrogram of a velocity, from the last phase, along the axis along which
+    the first watched point moves; and which points do not move along it, in words: of those there is no spectrum."""
     run = e.run
     if run is None:
-        return {}
+        return {}, ()
+    motion = shown_motion(run)
+    if motion is None:
+        names = ", ".join(run.watch_names)
+        return {}, (() if not names else (f"{names}: held, without any motion in the run; no spectrum is drawn.",))
+    number, along = motion
+    axis = "xyz".index(along)
     part = run.phase_slice()
     start, stop = part.start, part.stop
-    if stop - start < 64 or not run.watch_names:
-        return {}
+    if stop - start < 64:
+        return {}, ()
     half = slice((start + stop) // 2, stop)
-    spectra = {name: spectrum(run.acceleration[half, k, 0], run.sampling) for k, name in enumerate(run.watch_names)}
+    moving = {name: run.acceleration[half, k, axis] for k, name in enumerate(run.watch_names)}
+    spectra = {name: spectrum(signal, run.sampling) for name, signal in moving.items() if signal.any()}
+    if not spectra:
+        return {}, (f"{', '.join(run.watch_names)}: at rest in the second half of the run; no spectrum is drawn.",)
+    held = _held(run, axis, spectra)
     limit = e.case.modal.max_frequency_hz
     # Six samples per period of the highest frequency shown are plenty for a picture.
     every = max(1, int(1.0 / (6 * limit * run.sampling)))
-    signal = low_passed(run.velocity[part, 0, 0], run.sampling, limit)
+    signal = low_passed(run.velocity[part, number, axis], run.sampling, limit)
     cut = (stop - start - len(signal)) // 2
+    found: dict[str, Any] = {
+        "spectra": spectra,
+        "spectra_of": f"acceleration along {along} over the second half of the last phase",
+        "spectrogram_of": f"velocity along {along} of {run.watch_names[number]} in the last phase",
+        "spectrogram_start": float(run.time[start + cut]),
+    }
     picture = spectrogram(signal[::every], run.sampling * every, resolution_hz=limit / 100)
-    return {"spectra": spectra, "spectrogram": picture, "spectrogram_start": float(run.time[start + cut])}
+    return found | ({"spectrogram": picture} if picture.amplitude.any() else {}), held
+
+
+def _held(run: Trajectory, axis: int, shown: Collection[str]) -> tuple[str, ...]:
+    """What is said of watched points that do not move along the axis of the spectra, or along those before it."""
+    along = "xyz"[axis]
+    before = " and ".join("xyz"[:axis])
+    said = () if not axis else (f"{next(iter(shown))} is held along {before}: its motion is shown along {along}.",)
+    others = ", ".join(name for name in run.watch_names if name not in shown)
+    return said if not others else (*said, f"{others}: no motion along {along}, and no spectrum of it.")
 
 
 def _shapes(e: Everything) -> dict[str, Any]:

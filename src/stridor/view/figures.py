@@ -10,7 +10,7 @@ from ..modal.onsets import Onset
 from . import plots
 from .inputs import ReportInputs
 from .page_parts import ReportFigure
-from .windows import Window
+from .windows import Window, shown_motion
 
 
 def model_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
@@ -166,14 +166,16 @@ def _all_branches(inputs: ReportInputs) -> Iterator[ReportFigure]:
 def temporal_figures(inputs: ReportInputs, window: Window | None) -> Iterator[ReportFigure]:
     """Histories, spectra, the contact, energies."""
     run = inputs.trajectory
-    if run is not None and run.watch_names and len(run.time) > 1:
+    motion = None if run is None or len(run.time) < 2 else shown_motion(run)
+    if run is not None and motion is not None:
+        point, along = run.watch_names[motion[0]], motion[1]
         yield ReportFigure(
             "acceleration",
-            f"Acceleration of {run.watch_names[0]}",
-            f"Along x, over the whole run. The dark band is what lies below {inputs.max_frequency_hz / 1e3:g} kHz, the "
-            "light one everything the time step resolves, impacts included. Dotted lines: where phases begin.",
-            f"Acceleration of {run.watch_names[0]} over time with the phases of the run marked.",
-            plots.acceleration_history(run, max_frequency_hz=inputs.max_frequency_hz),
+            f"Acceleration of {point}",
+            f"Along {along}, over the whole run. The dark band is what lies below {inputs.max_frequency_hz / 1e3:g} "
+            "kHz, the light one everything the time step resolves, impacts included. Dotted lines: where phases begin.",
+            f"Acceleration of {point} along {along} over time with the phases of the run marked.",
+            plots.acceleration_history(run, point, direction=along, max_frequency_hz=inputs.max_frequency_hz),
         )
     if run is not None and run.contact_names and len(run.time) > 1:
         for k, name in enumerate(run.contact_names):
@@ -191,7 +193,9 @@ def temporal_figures(inputs: ReportInputs, window: Window | None) -> Iterator[Re
         yield ReportFigure(
             "energy",
             "Energy balance",
-            "Above: what was put in, what is stored and what was taken out. Below: what is missing in the balance, "
+            "Above: what was put in, what is stored in the bodies and what was taken out. What goes into contacts is "
+            "one sum: what impacts take, and what springs of contacts (of those with a stiffness) store and give back. "
+            "Below: what is missing in the balance, "
             "relative to the largest energy that changed hands.",
             "Energies over time, and the imbalance of the energy balance.",
             plots.energy_plot(run, inputs.energy),
@@ -246,7 +250,7 @@ def _contact_window(inputs: ReportInputs, window: Window) -> Iterator[ReportFigu
     if window.separation_fraction:
         shares.append(f"{100 * window.separation_fraction:.0f} % separation")
     caption = (
-        f"Contact {name} over three periods ({window.reason}): normal force up to "
+        f"Contact {name} over {window.length}, {window.reason}: normal force up to "
         f"{measured(window.max_normal_force, 1)} N, slip speed up to {measured(window.max_slip_speed, 3)} m/s, "
         f"{', '.join(shares)}."
     )
@@ -254,9 +258,9 @@ def _contact_window(inputs: ReportInputs, window: Window) -> Iterator[ReportFigu
         caption += " Where it sticks, slave and master move together, though not evenly: both vibrate."
     yield ReportFigure(
         "contact-window",
-        "Normal force and velocities over three periods",
+        f"Normal force and velocities over {window.length}",
         caption,
-        f"Normal force and tangential velocities of contact {name} over three periods; stick and slip shaded.",
+        f"Normal force and tangential velocities of contact {name} over {window.length}; stick and slip shaded.",
         plots.contact_force_and_velocity(
             run,
             window,
@@ -268,8 +272,8 @@ def _contact_window(inputs: ReportInputs, window: Window) -> Iterator[ReportFigu
     yield ReportFigure(
         "portrait",
         "Normal force over slip velocity",
-        "The same three periods. On the vertical line at zero the contact sticks.",
-        f"Closed loops of normal force over slip velocity of contact {name}.",
+        f"The same {window.length}. On the vertical line at zero the contact sticks.",
+        f"Normal force over slip velocity of contact {name}.",
         plots.phase_portrait(run, window),
     )
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -16,13 +17,14 @@ from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onset, Onsets
 from ..typing import Array, BoolArray
 from .colours import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION
-from .style import legend_above, panel, styled, zero_line
+from .style import legend_above, panel, root_figure, styled, zero_line
 
 LINES = (BLUE, GREEN, PURPLE, SKY, ORANGE)  # vermilion is kept for what is unstable
 MU = "friction coefficient μ"
 FEW = 6  # up to so many branches each has its own colour and a name
 MARKED = 40  # unstable points marked along a branch, at most
 RANGE_OF_CURVE = (0.0, 1.0)
+DIAMOND, LETTER, LABEL_HEIGHT = 3.5, 5.3, 25.0  # of onsets and of their labels, with the white about these [points]
 
 
 @styled
@@ -32,11 +34,13 @@ def root_locus(modes: ComplexModes, *, max_frequency_hz: float | None = None, ax
     figure, ax = panel(ax, 4.4)
     top = _top(modes, max_frequency_hz)
     scatter = None
+    # One scale for all: scatter leaves out what is NaN and would scale each branch by the μ at which it is listed.
+    norm = Normalize(float(modes.mu.min()), float(modes.mu.max()))
     for b in range(len(modes.branch)):
         growth, frequency = modes.growth_rate[:, b], modes.frequency_hz[:, b] / 1e3
         ax.plot(growth, frequency, color="#BBBBBB", linewidth=0.8, zorder=2)
         scatter = ax.scatter(
-            growth, frequency, c=modes.mu, cmap="viridis", s=9, zorder=3, linewidths=0, rasterized=True
+            growth, frequency, c=modes.mu, norm=norm, cmap="viridis", s=9, zorder=3, linewidths=0, rasterized=True
         )
     ax.axvline(0.0, color=INK, linewidth=0.8, zorder=1.5)
     ax.set(xlabel="growth rate Re λ [1/s]   (right of 0: grows)", ylabel="frequency [kHz]", ylim=(0, top / 1e3))
@@ -76,15 +80,19 @@ def frequency_branches(
         label = f"mode {modes.branch[b]}" if few else None
         ax.plot(modes.mu, values, style, color=colour, label=label, linewidth=1.5 if few else 1.1)
         _mark_unstable(ax, modes.mu, values, unstable)
-    if onsets is not None:
-        for onset in onsets.onsets:
-            if (branches is None or set(onset.branches) & set(branches)) and onset.mu <= modes.mu.max():
-                _mark_onset(ax, onset, onset.frequency_hz / scale, beside=few)
     if not few:
         ax.set_ylim(0, _top(modes, max_frequency_hz) / scale)
     _friction_axis(ax, modes)
+    unnamed = 0
+    if onsets is not None:
+        marked = [
+            (onset.mu, onset.frequency_hz / scale, onset)
+            for onset in onsets.onsets
+            if (branches is None or set(onset.branches) & set(branches)) and onset.mu <= modes.mu.max()
+        ]
+        unnamed = _mark_onsets(ax, marked, beside=few)
     ax.set_ylabel(f"frequency [{unit}]")
-    _legend(ax, bool(modes.unstable[:, columns].any()), onsets is not None)
+    _legend(ax, bool(modes.unstable[:, columns].any()), onsets is not None, unnamed)
     return figure
 
 
@@ -172,15 +180,14 @@ def friction_curve(
             fontsize=8.5,
             color=GREY,
         )
-    for onset in onsets.onsets if onsets is not None else ():
-        if low <= onset.mu <= high:
-            _mark_onset(ax, onset, onset.mu, x=onset.frequency_hz / 1e3)
     ax.set(
         xlabel="frequency [kHz]",
         ylabel=MU,
         ylim=(low - 0.02 * span, high + 0.06 * span),
         xlim=(frequency_hz[0] / 1e3, frequency_hz[-1] / 1e3),
     )
+    named = onsets.onsets if onsets is not None else ()
+    _mark_onsets(ax, [(onset.frequency_hz / 1e3, onset.mu, onset) for onset in named if low <= onset.mu <= high])
     return figure
 
 
@@ -239,29 +246,72 @@ def _mark_unstable(ax: Axes, mu: Array, values: Array, unstable: BoolArray) -> N
     ax.plot(mu[marked], values[marked], "o", mfc="white", mec=VERMILION, ms=4, mew=1.0, zorder=3.5)
 
 
-def _mark_onset(ax: Axes, onset: Onset, y: float, x: float | None = None, *, beside: bool = False) -> None:
-    """A diamond at an onset, its μ and frequency above it or, where branches come down there, below right."""
-    at = (onset.mu if x is None else x, y)
-    ax.plot(*at, "D", color=INK, ms=4.5, zorder=4)
-    ax.annotate(
-        f"μ = {measured(onset.mu, 4)}\n{measured(onset.frequency_hz, 0)} Hz",
-        at,
-        xytext=(8, -8) if beside else (0, 7),
-        textcoords="offset points",
-        ha="left" if beside else "center",
-        va="top" if beside else "bottom",
-        fontsize=8,
-        zorder=5,
-        bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.85},
+def _mark_onsets(ax: Axes, marked: Sequence[tuple[float, float, Onset]], *, beside: bool = False) -> int:
+    """Diamonds at onsets, of each its place (x, y) in the axes, with their μ and frequency where that covers neither
+    another one nor a diamond; how many have no room. Axes must have their limits; beside: rather below right."""
+    for x, y, _ in marked:
+        ax.plot(x, y, "D", color=INK, ms=4.5, zorder=4)
+    ax.autoscale_view()  # takes what was drawn into limits that are not set
+    # Points of print. What lays a figure out makes axes larger than they are here, and labels part further.
+    per_point = 72.0 / root_figure(ax).dpi
+    at = per_point * np.reshape(ax.transData.transform([(x, y) for x, y, _ in marked] or np.zeros((0, 2))), (-1, 2))
+    frame = per_point * ax.get_window_extent().get_points()
+    taken = [(x - DIAMOND, y - DIAMOND, x + DIAMOND, y + DIAMOND) for x, y in at]
+    unnamed = 0
+    for own, ((x, y), (*place, onset)) in enumerate(zip(at, marked, strict=True)):
+        text = f"μ = {measured(onset.mu, 4)}\n{measured(onset.frequency_hz, 0)} Hz"
+        wide, high = LETTER * max(map(len, text.split("\n"))), LABEL_HEIGHT
+        for dx, dy in _offsets(wide, high, beside):
+            box = x + dx - wide / 2, y + dy - high / 2, x + dx + wide / 2, y + dy + high / 2
+            inside = frame[0, 1] <= box[1] and box[3] <= frame[1, 1] and frame[0, 0] - wide / 2 <= box[0]
+            inside = inside and box[2] <= frame[1, 0] + wide / 2
+            if inside and not any(_overlap(box, other) for k, other in enumerate(taken) if k != own):
+                break
+        else:
+            unnamed += 1
+            continue
+        taken.append(box)
+        far = abs(dy) > high
+        ax.annotate(
+            text,
+            (place[0], place[1]),
+            xytext=(dx, dy),
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            fontsize=8,
+            zorder=5,
+            bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.85},
+            arrowprops={"arrowstyle": "-", "color": GREY, "lw": 0.6, "shrinkB": 3} if far else None,
+        )
+    return unnamed
+
+
+def _offsets(wide: float, high: float, beside: bool) -> list[tuple[float, float]]:
+    """Places of a label's middle about its onset [points], the first that is free is taken: near ones first."""
+    side, near = wide / 2 + 7, high / 2 + 7
+    above, below = [(0.0, near), (side, near), (-side, near)], [(0.0, -near), (side, -near), (-side, -near)]
+    level = [(side, 0.0), (-side, 0.0)]
+    far = [(x, sign * (near + high + 3)) for sign in (1, -1) for x in (0.0, side, -side)]
+    return (
+        [below[1], above[1], *level, *above, *below, *far]
+        if beside
+        else [*above[:1], *below[:1], *level, *above, *below, *far]
     )
 
 
-def _legend(ax: Axes, unstable: bool, onsets: bool) -> None:
+def _overlap(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
+    """Whether two boxes (left, bottom, right, top) do."""
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+def _legend(ax: Axes, unstable: bool, onsets: bool, unnamed: int = 0) -> None:
     handles, _ = ax.get_legend_handles_labels()
     if unstable:
         handles.append(Line2D([], [], color=VERMILION, marker="o", mfc="white", ms=4, linewidth=2.2, label="unstable"))
     if onsets:
-        handles.append(Line2D([], [], color=INK, marker="D", ms=4.5, linestyle="none", label="onset, solved"))
+        words = "onset, solved" + (f" ({unnamed} without room for their values)" if unnamed else "")
+        handles.append(Line2D([], [], color=INK, marker="D", ms=4.5, linestyle="none", label=words))
     legend_above(ax, handles)
 
 

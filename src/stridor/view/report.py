@@ -133,7 +133,8 @@ def _window(inputs: ReportInputs) -> Window | None:
     run = inputs.trajectory
     if run is None or not run.contact_names or not run.phases or len(run.time) < 3:
         return None
-    return regime_window(run, inputs.dominant_hz)
+    still = inputs.unsaturated
+    return regime_window(run, inputs.dominant_hz if still is None else still.frequency_hz)
 
 
 def _modal(inputs: ReportInputs) -> Chapter:

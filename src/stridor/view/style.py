@@ -160,6 +160,8 @@ def legend_above(
     if shown:
         more = {} if height is None else {"handleheight": height, "handlelength": 2.2 * height}
         ax.legend(handles=shown, loc="lower left", bbox_to_anchor=(0, 1.0), ncols=columns, borderaxespad=0.2, **more)
+        # A common factor of the axis, as 1e5, has its place where the legend begins, which would hide it.
+        ax.yaxis.get_offset_text().set_horizontalalignment("right")
 
 
 def zero_line(ax: Axes) -> None:
@@ -196,3 +198,11 @@ def largest(values: Array) -> float:
     finite = np.abs(values[np.isfinite(values)])
     size = float(finite.max(initial=0.0))
     return size if size > 0 else 1.0
+
+
+def energy_unit(joules: float) -> tuple[float, str]:
+    """The unit [J] in which an energy is a number from 1 to 1000, and its name; mJ of nothing."""
+    for unit, name in ((1e6, "MJ"), (1e3, "kJ"), (1.0, "J"), (1e-3, "mJ"), (1e-6, "µJ")):
+        if joules >= unit:
+            return unit, name
+    return (1e-9, "nJ") if joules > 0 else (1e-3, "mJ")

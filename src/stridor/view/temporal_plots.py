@@ -19,6 +19,7 @@ from ..typing import Array
 from .colours import BLUE, COLOURS, GREEN, GREY, INK, ORANGE, PURPLE, SKY, STATUS_COLOURS, VERMILION
 from .style import (
     draw_history,
+    energy_unit,
     extrema,
     legend_above,
     new_figure,
@@ -31,8 +32,9 @@ from .style import (
 )
 from .windows import Window, status_spans
 
-DIRECTIONS = {"x": 0, "y": 1}
+DIRECTIONS = {"x": 0, "y": 1, "z": 2}
 DECIBEL_SPAN = 70.0  # shown below the largest line
+HELD = "does not move: zero throughout"
 USUAL = 99.7  # per cent of a history that its axis must show
 
 
@@ -65,6 +67,8 @@ def acceleration_history(
         ax.legend(loc="upper left")
     else:
         draw_history(ax, time, values, width=0.6)
+    if not values.any():
+        _say(ax, HELD)
     mark_phases(ax, trajectory)
     zero_line(ax)
     ax.set(xlabel="time [s]", ylabel=f"acceleration {direction} [m/s²]")
@@ -95,6 +99,11 @@ def spectrum_plot(
     top = -np.inf
     for index, (name, spec) in enumerate(spectra.items()):
         inside = (spec.frequency_hz > 0) & (spec.frequency_hz <= max_frequency_hz)
+        if not spec.amplitude[inside].any():  # of nothing there are no decibels
+            if ax is None:
+                axes[index].set_title(name, fontsize=9, color=COLOURS[index % len(COLOURS)], pad=3)
+                _say(axes[index], HELD)
+            continue
         level = 20 * np.log10(np.maximum(spec.amplitude[inside], 1e-300))
         top = max(top, float(level.max(initial=-np.inf)))
         colour = COLOURS[index % len(COLOURS)]
@@ -109,9 +118,12 @@ def spectrum_plot(
             _mark_harmonics(each, marked_hz, max_frequency_hz, named=each is axes[0])
     if np.isfinite(top):
         axes[0].set_ylim(top - DECIBEL_SPAN, top + 8)
+    elif ax is not None:
+        _say(ax, HELD)
     axes[-1].set(xlabel="frequency [kHz]", xlim=(0, max_frequency_hz / 1e3))
     if ax is not None:
-        ax.legend()
+        if ax.get_legend_handles_labels()[0]:
+            ax.legend()
     else:
         figure.supylabel(f"amplitude [dB re 1 {unit}]", fontsize=9.5)
     return figure
@@ -130,6 +142,10 @@ def spectrogram_plot(
     figure, ax = panel(ax, 3.6)
     inside = content.frequency_hz <= max_frequency_hz
     amplitude = content.amplitude[inside]
+    if not amplitude.any():
+        ax.set(xlabel="time [s]", ylabel="frequency [kHz]")
+        _say(ax, HELD)
+        return figure
     level = 20 * np.log10(np.maximum(amplitude / largest_of(amplitude), 1e-300))
     time, frequency = start + content.time, content.frequency_hz[inside] / 1e3
     half = 0.5 * float(time[1] - time[0]) if len(time) > 1 else 0.5 / content.resolution_hz
@@ -265,12 +281,13 @@ def energy_plot(trajectory: Trajectory, balance: EnergyBalance, *, axes: Sequenc
         ("stored", stored, INK, "-"),
         ("taken out by damping", works["damping"][step], GREEN, "--"),
         ("taken out by friction", works["friction"][step], VERMILION, "--"),
-        ("taken out by impacts", works["contact"][step], PURPLE, "--"),
+        ("into impacts and contact springs", works["contact"][step], PURPLE, "--"),
         *((f"put in by {name} forces", works[name][step], ORANGE, "-") for name in ("circulatory",) if name in works),
     )
+    unit, its_name = energy_unit(max(float(np.abs(values).max(initial=0.0)) for _, values, _, _ in curves))
     for name, values, colour, style in curves:
-        above.plot(time, 1e3 * values, style, color=colour, label=name, linewidth=1.3)
-    above.set_ylabel("energy [mJ]")
+        above.plot(time, values / unit, style, color=colour, label=name, linewidth=1.3)
+    above.set_ylabel(f"energy [{its_name}]")
     legend_above(above, columns=3)
     mark_phases(above, trajectory, named=False)
     if len(balance.history) == len(trajectory.time):
@@ -310,13 +327,22 @@ def _usual_limits(ax: Axes, values: Array, *, around: Array | None = None, symme
     if symmetric:
         top = max(top, -bottom)
         bottom = -top
-    ends = float(values.min(initial=0.0)), float(values.max(initial=0.0))
+    ends = float(values.min()), float(values.max())
     beyond = 0.3 * (top - bottom)
-    if top <= bottom or (ends[1] <= top + beyond and ends[0] >= bottom - beyond):
+    leaves = ends[0] < bottom - beyond, ends[1] > top + beyond
+    if top <= bottom:
+        return
+    if not any(leaves):
+        if not bottom - beyond <= 0.0 <= top + beyond:  # else the line at zero would flatten what swings far from it
+            room = 0.05 * (ends[1] - ends[0])
+            ax.set_ylim(ends[0] - room, ends[1] + room)
         return
     margin = (0.08 if around is None else 0.25) * (top - bottom)
-    ax.set_ylim(bottom - margin, top + margin)
-    peak = max(ends, key=abs)
+    low_end, high_end = bottom - margin, top + margin
+    # At an end that no peak leaves by much the frame is wide enough for all that is there.
+    shown = low_end if leaves[0] else min(low_end, ends[0]), high_end if leaves[1] else max(high_end, ends[1])
+    ax.set_ylim(*((-max(-shown[0], shown[1]), max(-shown[0], shown[1])) if symmetric else shown))
+    peak = max((end for end, gone in zip(ends, leaves, strict=True) if gone), key=abs)
     ax.annotate(
         f"single peaks leave the frame, the largest {abs(peak):.3g}",
         (0.995, 0.015),
@@ -327,6 +353,11 @@ def _usual_limits(ax: Axes, values: Array, *, around: Array | None = None, symme
         color=GREY,
         bbox={"boxstyle": "round,pad=0.2", "fc": "white", "ec": "none", "alpha": 0.85},
     )
+
+
+def _say(ax: Axes, words: str) -> None:
+    """Words in the middle of a panel that has nothing to show."""
+    ax.text(0.5, 0.6, words, transform=ax.transAxes, ha="center", va="center", color=GREY)
 
 
 def _mark_harmonics(ax: Axes, fundamental: float, top: float, *, named: bool) -> None:

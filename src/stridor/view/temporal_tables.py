@@ -124,7 +124,7 @@ def energy_table(balance: EnergyBalance) -> Table:
         ("put in by moving supports", balance.support, 1),
         ("taken out by damping", balance.damping, -1),
         ("taken out by friction", balance.friction, -1),
-        ("taken out by impacts", balance.contact, -1),
+        ("into impacts and springs of contacts", balance.contact, -1),
         ("stored at the end as motion", balance.kinetic, -1),
         ("stored at the end as deformation", balance.elastic, -1),
     )

@@ -7,17 +7,19 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..digits import measured
 from ..temporal.trajectory import STATUS, Trajectory
 from ..typing import IntArray
 
 SEPARATION, STICK, SLIP = (STATUS.index(name) for name in ("separation", "stick", "slip"))
 SETTLED = 0.6  # of a regime has passed before it is shown
+ENOUGH = 10  # records of a period draw it; how many there are is said of fewer
 
 
 @dataclass(frozen=True)
 class Window:
     """From start to end [s] of a run, why just there, and what contact did in it: largest normal force [N],
-    largest slip speed [m/s], fractions of the time."""
+    largest slip speed [m/s], fractions of the time. length: how much that is, in words ("three periods of 1000 Hz")."""
 
     start: float
     end: float
@@ -26,6 +28,7 @@ class Window:
     max_slip_speed: float
     stick_fraction: float
     separation_fraction: float
+    length: str = "the window"
 
 
 def regime_window(
@@ -34,7 +37,8 @@ def regime_window(
     """``periods`` at ``frequency_hz`` of the last phase, late in the regime before the first separation.
 
     Among the windows there the one whose status changes come nearest to two in a period, once to stick and
-    once to slip. Without separation it is the end of the run; None for a run that is shorter than the window.
+    once to slip. Without separation it is the end of the run; None for a run that is shorter than the window. Without a
+    frequency the window is a fiftieth of the phase, however many periods of whatever that is.
     """
     part = trajectory.phase_slice()
     status = trajectory.status[part, contact]
@@ -59,7 +63,17 @@ def regime_window(
         max_slip_speed=float(np.abs(trajectory.slip_speed[chosen, contact]).max()),
         stick_fraction=float(np.mean(inside == STICK)),
         separation_fraction=float(np.mean(inside == SEPARATION)),
+        length=_length(size, size * trajectory.sampling, frequency_hz, periods),
     )
+
+
+def _length(records: int, seconds: float, frequency_hz: float | None, periods: float) -> str:
+    """How much is shown: periods of what, or where no frequency is known, for how long."""
+    if not frequency_hz:
+        return f"{1e3 * seconds:.3g} ms ({records} records)"
+    count = {3.0: "three"}.get(periods, f"{periods:g}")
+    text = f"{count} periods of {measured(frequency_hz, 0)} Hz"
+    return text if records >= ENOUGH * periods else f"{text} ({records} records)"
 
 
 def _chosen(status: IntArray, size: int, periods: float) -> int:
@@ -81,3 +95,12 @@ def status_spans(trajectory: Trajectory, part: slice, contact: int = 0) -> list[
     edges = np.concatenate([[0], np.flatnonzero(np.diff(status)) + 1, [len(status)]])
     ends = np.append(time, time[-1] + trajectory.sampling)
     return [(STATUS[int(status[a])], float(ends[a]), float(ends[b])) for a, b in pairwise(edges)]
+
+
+def shown_motion(trajectory: Trajectory) -> tuple[int, str] | None:
+    """Number of the watched point whose motion is shown, and along which axis: the first that moves at all, along the
+    first axis along which it does. None where all are held: a freedom that a support takes is exactly zero."""
+    moving = (trajectory.acceleration != 0).any(axis=0)
+    for number, along in np.argwhere(moving):
+        return int(number), "xyz"[int(along)]
+    return None

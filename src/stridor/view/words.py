@@ -46,7 +46,7 @@ def verdict(inputs: ReportInputs) -> Verdict:
     if growing is None:
         return Verdict(_undecided(inputs), paragraph, None, agrees)
     if not growing:
-        return Verdict(f"It does not squeal{at}", paragraph, squeals, agrees)
+        return Verdict(f"It does not squeal{at} up to {_khz(inputs)}", paragraph, squeals, agrees)
     if inputs.unsaturated is not None:
         still = inputs.unsaturated
         hz = measured(still.frequency_hz, 0)
