@@ -120,6 +120,37 @@ def test_members_start_from_their_own_steady_sliding():
         assert_same(found[number, 0], alone(system, phases, settings, member))
 
 
+# A mass on oblique springs that rubs on a belt; friction that depends on speed, whatever its law.
+RUBBING = """
+units = "nondimensional"
+bodies.belt = {type = "obstacle", shape = "flat", point = [0, 0], normal = [0, 1], sliding = {velocity = [0.4, 0]}}
+bodies.m = {type = "mass", mass = 1.0, position = [0, 0]}
+springs.a = {between = ["m", "ground"], direction = [1, 0.6], stiffness = 1.3, damping = 0.3}
+springs.b = {between = ["m", "ground"], direction = [-0.7, 1], stiffness = 1.0, damping = 0.3}
+loads.p = {at = "m", force = [0, -1]}
+contacts.c = {slave = "m", master = "belt", stiffness = 2.0, friction = {LAW}}
+phases = [{name = "slide", duration = 1.0}]
+modal = {friction_range = [0, 1.5], max_frequency_hz = 1.0}
+temporal = {initial = "steady-sliding", watch = ["m"], step = 0.01, record_every = 1}
+"""
+
+
+@pytest.mark.parametrize("stepper", ["explicit", "implicit"])
+def test_separate_runs_start_from_their_own_steady_sliding_at_every_speed(stepper):
+    law = 'law = "weakening", coefficient = 0.4, static_coefficient = 0.6, decay_speed = 0.5'
+    case = st.loads(RUBBING.replace("LAW", law)).with_({"temporal.stepper": stepper})
+    found = st.ensemble(case, mu=0.4, speed=[0.5, 1.0, 2.0], window=1.0, records=True, separately=True)
+    stiffness = sum(k * np.outer(d, d) / (d @ d) for k, d in ((1.3, np.array([1, 0.6])), (1.0, np.array([-0.7, 1]))))
+    for factor, run in zip(found.speed, found.runs, strict=True):
+        assert run is not None
+        scale = 0.4 / (0.4 + 0.2 * np.exp(-0.4 / 0.5))  # μ is asked for at the belt's own speed
+        mu = scale * (0.4 + 0.2 * np.exp(-0.4 * factor / 0.5))
+        u = np.linalg.solve(stiffness + 2.0 * np.outer([mu, 1.0], [0.0, 1.0]), [0.0, -1.0])
+        # The force of the contact over the whole run: steady sliding stays.
+        np.testing.assert_allclose(run.normal_force, -2.0 * u[1], rtol=1e-9)
+        np.testing.assert_allclose(np.abs(run.slip_speed), 0.4 * factor, rtol=1e-9)
+
+
 def test_several_contacts_of_one_body_are_solved_together_as_in_a_single_run():
     # Six rows act on the base: more than one pass over its modes takes.
     slaves = [Slave(place=place, stiffness="rigid", elements=4) for place in (0.35, 0.6, 0.8)]
