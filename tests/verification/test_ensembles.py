@@ -151,6 +151,38 @@ def test_separate_runs_start_from_their_own_steady_sliding_at_every_speed(steppe
         np.testing.assert_allclose(np.abs(run.slip_speed), 0.4 * factor, rtol=1e-9)
 
 
+@pytest.mark.parametrize("sweep", [None, "up"])
+def test_separate_runs_keep_interferences_and_distances_of_supports(sweep):
+    text = RUBBING.replace("LAW", 'law = "coulomb", coefficient = 0.4').replace("stiffness = 2.0", "STIFF", 1)
+    text = text.replace("STIFF", "stiffness = 2.0, interference = 0.01")
+    text += """
+[bodies.w]
+type = "mass"
+mass = 1.0
+position = [-1.0, 0.0]
+[springs.w]
+between = ["m", "w"]
+direction = [0.0, 1.0]
+stiffness = 0.5
+[supports.w]
+at = "w"
+fixed = ["x", "y"]
+displacement = {y = -0.02}
+"""
+    case = st.loads(text).with_({"temporal.stepper": "explicit", "phases.slide.duration": 2.0})
+    found = st.ensemble(case, mu=[0.2, 0.3], speed=2.0, window=0.5, records=True, separately=True, sweep=sweep)
+    assert found.error == ("", "")
+    alone = st.simulate(case.with_({"phases.slide.velocities.belt": 2.0}), mu=0.2)
+    assert found.runs[0] is not None and found.runs[1] is not None
+    np.testing.assert_allclose(found.runs[0].normal_force, alone.normal_force, rtol=1e-9)
+    if sweep:
+        # What is pressed in stays so from one member to the next.
+        assert found.runs[1].normal_force[0] == pytest.approx(found.runs[0].normal_force[-1], rel=1e-3)
+    else:
+        steady = steady_sliding(build_system(case), mu=0.3)
+        np.testing.assert_allclose(found.runs[1].normal_force[:, 0], steady.normal_force[0], rtol=1e-9)
+
+
 def test_several_contacts_of_one_body_are_solved_together_as_in_a_single_run():
     # Six rows act on the base: more than one pass over its modes takes.
     slaves = [Slave(place=place, stiffness="rigid", elements=4) for place in (0.35, 0.6, 0.8)]
