@@ -173,7 +173,8 @@ displacement = {y = -0.02}
     found = st.ensemble(case, mu=[0.2, 0.3], speed=2.0, window=0.5, records=True, separately=True, sweep=sweep)
     assert found.error == ("", "")
     alone = st.simulate(case.with_({"phases.slide.velocities.belt": 2.0}), mu=0.2)
-    assert found.runs[0] is not None and found.runs[1] is not None
+    assert found.runs[0] is not None
+    assert found.runs[1] is not None
     np.testing.assert_allclose(found.runs[0].normal_force, alone.normal_force, rtol=1e-9)
     if sweep:
         # What is pressed in stays so from one member to the next.
