@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..asking import FUNCTION, NUMBER, NUMBERS, SWITCH, TEXT, takes
+from ..case.fields import MOST
 from ..errors import CaseError
 from ..modal.painleve import steps_undetermined
 from ..sliding import full_motion
@@ -142,6 +143,8 @@ def _values(
         low = array <= 0.0 if factor else array < 0.0
         if values is not None and (array.ndim != 1 or not len(array) or not np.isfinite(array).all() or low.any()):
             raise CaseError(name, values, f"finite numbers {'above 0' if factor else '≥ 0'}, at least one")
+        if array.max() > MOST:  # as of every number of a case
+            raise CaseError(name, float(array.max()), f"numbers up to {MOST:g}")
         made[name] = array
     return made
 
