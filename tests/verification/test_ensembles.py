@@ -405,3 +405,22 @@ def test_the_modal_map_is_that_of_the_modes_at_each_friction_and_speed():
     assert constant.modal.speed.tolist() == [1.0]
 
 
+def test_members_under_other_loads_have_the_modes_of_their_own_load():
+    law = 'law = "weakening", coefficient = 0.2, static_coefficient = 0.8, decay_speed = 0.5'
+    changes = {"temporal.stepper": "explicit", "springs.a.damping": 0.1, "springs.b.damping": 0.1}
+    changes |= {"temporal.perturbation": 1e-4, "phases.slide.duration": 20.0}
+    case = st.loads(RUBBING.replace("LAW", law)).with_(changes)
+    found = st.ensemble(case, mu=0.4, load=[0.1, 1.0, 4.0], separately=True)
+    counts = []
+    for factor, mode_hz in zip([0.1, 1.0, 4.0], found.mode_hz, strict=True):
+        own = st.modes(case.with_({"loads.p.force": [0.0, -factor]}), mu=0.4)
+        growing = own.frequency_hz[0][own.unstable[0] & (own.frequency_hz[0] > 0)]
+        counts.append(len(growing))
+        if np.isfinite(mode_hz):
+            assert np.abs(growing - mode_hz).min() <= 1e-9 * mode_hz
+    assert counts[0] < counts[-1]  # N·dμ/dv makes more of them grow
+    assert found.modal.load == 1.0
+    assert found.modal.unstable.tolist() == [[counts[1]]]
+    assert not np.isfinite(found.mode_hz[0])
+    assert np.isfinite(found.mode_hz[-1])
+    assert any("modes depend on the loads" in note for note in found.notes)
