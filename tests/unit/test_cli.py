@@ -54,6 +54,19 @@ def document(done: subprocess.CompletedProcess[str]) -> dict:
     return json.loads(done.stdout)
 
 
+def test_an_ensemble_with_failed_members_says_so_in_its_exit_code(folder: Path) -> None:
+    words = ["ensemble", "two-beams.toml", "--mu", "0.1", "--window", "1", *SETS, "--out", "out"]
+    steady = [
+        "--set", "temporal.initial=\"steady-sliding\"", "--set", "phases.press.velocities.clamp=1", "--set",
+        "phases.press.ramp=0", "--set", "phases.press.duration=2e-4", "--set", "phases.slide.duration=2e-4",
+    ]  # fmt: skip
+    fine = stridor(*words, *steady, cwd=folder)
+    assert fine.returncode == 0, fine.stderr
+    pulled = stridor(*words, *steady, "--set", "loads.press.force=[0.0, 20.0]", cwd=folder)
+    assert "failed, 1 of 1 members: " in pulled.stdout
+    assert pulled.returncode == 3
+
+
 def test_new_does_not_overwrite(folder: Path) -> None:
     again = stridor("new", "two-beams", cwd=folder)
     assert again.returncode == 2

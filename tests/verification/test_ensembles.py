@@ -120,6 +120,70 @@ def test_members_start_from_their_own_steady_sliding():
         assert_same(found[number, 0], alone(system, phases, settings, member))
 
 
+# A mass on oblique springs that rubs on a belt; friction that depends on speed, whatever its law.
+RUBBING = """
+units = "nondimensional"
+bodies.belt = {type = "obstacle", shape = "flat", point = [0, 0], normal = [0, 1], sliding = {velocity = [0.4, 0]}}
+bodies.m = {type = "mass", mass = 1.0, position = [0, 0]}
+springs.a = {between = ["m", "ground"], direction = [1, 0.6], stiffness = 1.3, damping = 0.3}
+springs.b = {between = ["m", "ground"], direction = [-0.7, 1], stiffness = 1.0, damping = 0.3}
+loads.p = {at = "m", force = [0, -1]}
+contacts.c = {slave = "m", master = "belt", stiffness = 2.0, friction = {LAW}}
+phases = [{name = "slide", duration = 1.0}]
+modal = {friction_range = [0, 1.5], max_frequency_hz = 1.0}
+temporal = {initial = "steady-sliding", watch = ["m"], step = 0.01, record_every = 1}
+"""
+
+
+@pytest.mark.parametrize("stepper", ["explicit", "implicit"])
+def test_separate_runs_start_from_their_own_steady_sliding_at_every_speed(stepper):
+    law = 'law = "weakening", coefficient = 0.4, static_coefficient = 0.6, decay_speed = 0.5'
+    case = st.loads(RUBBING.replace("LAW", law)).with_({"temporal.stepper": stepper})
+    found = st.ensemble(case, mu=0.4, speed=[0.5, 1.0, 2.0], window=1.0, records=True, separately=True)
+    stiffness = sum(k * np.outer(d, d) / (d @ d) for k, d in ((1.3, np.array([1, 0.6])), (1.0, np.array([-0.7, 1]))))
+    for factor, run in zip(found.speed, found.runs, strict=True):
+        assert run is not None
+        scale = 0.4 / (0.4 + 0.2 * np.exp(-0.4 / 0.5))  # μ is asked for at the belt's own speed
+        mu = scale * (0.4 + 0.2 * np.exp(-0.4 * factor / 0.5))
+        u = np.linalg.solve(stiffness + 2.0 * np.outer([mu, 1.0], [0.0, 1.0]), [0.0, -1.0])
+        # The force of the contact over the whole run: steady sliding stays.
+        np.testing.assert_allclose(run.normal_force, -2.0 * u[1], rtol=1e-9)
+        np.testing.assert_allclose(np.abs(run.slip_speed), 0.4 * factor, rtol=1e-9)
+
+
+@pytest.mark.parametrize("sweep", [None, "up"])
+def test_separate_runs_keep_interferences_and_distances_of_supports(sweep):
+    text = RUBBING.replace("LAW", 'law = "coulomb", coefficient = 0.4').replace("stiffness = 2.0", "STIFF", 1)
+    text = text.replace("STIFF", "stiffness = 2.0, interference = 0.01")
+    text += """
+[bodies.w]
+type = "mass"
+mass = 1.0
+position = [-1.0, 0.0]
+[springs.w]
+between = ["m", "w"]
+direction = [0.0, 1.0]
+stiffness = 0.5
+[supports.w]
+at = "w"
+fixed = ["x", "y"]
+displacement = {y = -0.02}
+"""
+    case = st.loads(text).with_({"temporal.stepper": "explicit", "phases.slide.duration": 2.0})
+    found = st.ensemble(case, mu=[0.2, 0.3], speed=2.0, window=0.5, records=True, separately=True, sweep=sweep)
+    assert found.error == ("", "")
+    alone = st.simulate(case.with_({"phases.slide.velocities.belt": 2.0}), mu=0.2)
+    assert found.runs[0] is not None
+    assert found.runs[1] is not None
+    np.testing.assert_allclose(found.runs[0].normal_force, alone.normal_force, rtol=1e-9)
+    if sweep:
+        # What is pressed in stays so from one member to the next.
+        assert found.runs[1].normal_force[0] == pytest.approx(found.runs[0].normal_force[-1], rel=1e-3)
+    else:
+        steady = steady_sliding(build_system(case), mu=0.3)
+        np.testing.assert_allclose(found.runs[1].normal_force[:, 0], steady.normal_force[0], rtol=1e-9)
+
+
 def test_several_contacts_of_one_body_are_solved_together_as_in_a_single_run():
     # Six rows act on the base: more than one pass over its modes takes.
     slaves = [Slave(place=place, stiffness="rigid", elements=4) for place in (0.35, 0.6, 0.8)]
@@ -341,3 +405,22 @@ def test_the_modal_map_is_that_of_the_modes_at_each_friction_and_speed():
     assert constant.modal.speed.tolist() == [1.0]
 
 
+def test_members_under_other_loads_have_the_modes_of_their_own_load():
+    law = 'law = "weakening", coefficient = 0.2, static_coefficient = 0.8, decay_speed = 0.5'
+    changes = {"temporal.stepper": "explicit", "springs.a.damping": 0.1, "springs.b.damping": 0.1}
+    changes |= {"temporal.perturbation": 1e-4, "phases.slide.duration": 20.0}
+    case = st.loads(RUBBING.replace("LAW", law)).with_(changes)
+    found = st.ensemble(case, mu=0.4, load=[0.1, 1.0, 4.0], separately=True)
+    counts = []
+    for factor, mode_hz in zip([0.1, 1.0, 4.0], found.mode_hz, strict=True):
+        own = st.modes(case.with_({"loads.p.force": [0.0, -factor]}), mu=0.4)
+        growing = own.frequency_hz[0][own.unstable[0] & (own.frequency_hz[0] > 0)]
+        counts.append(len(growing))
+        if np.isfinite(mode_hz):
+            assert np.abs(growing - mode_hz).min() <= 1e-9 * mode_hz
+    assert counts[0] < counts[-1]  # N·dμ/dv makes more of them grow
+    assert found.modal.load == 1.0
+    assert found.modal.unstable.tolist() == [[counts[1]]]
+    assert not np.isfinite(found.mode_hz[0])
+    assert np.isfinite(found.mode_hz[-1])
+    assert any("modes depend on the loads" in note for note in found.notes)

@@ -10,7 +10,7 @@ from ..digits import measured, readable
 from ..errors import CaseError
 from ..interrupts import INTERRUPTED, heard
 from ..notebook import counted
-from .arguments import Call, verb
+from .arguments import INCOMPLETE, Call, verb
 from .closing import Conclusion
 from .option_table import Mu, Observable
 from .values import numbers, one_of
@@ -91,6 +91,8 @@ def ensemble(
         heard()
         call.say("interrupted; members that were finished are kept")
         raise typer.Exit(INTERRUPTED)
+    if "failed" in result.regimes:
+        raise typer.Exit(INCOMPLETE)
 
 
 def _show(result: Ensemble) -> None:

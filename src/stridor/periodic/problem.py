@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..errors import AnalysisError, CaseError
 from ..modal.options import Options
 from ..modal.painleve import refuse_undetermined
-from ..sliding import full_motion, slip_speeds, steady_nodes
+from ..sliding import full_motion, steady_nodes
 from ..system import System
 from ..temporal.steppers.basis import Basis
 from ..temporal.steppers.coordinates import left_out
@@ -17,7 +17,7 @@ from ..temporal.steppers.exact.drive import Piece
 from ..temporal.steppers.exact.statuses import BACKWARD, FORWARD, GAP, Pairs, Status
 from ..temporal.steppers.exact.stepper import coordinates_of, pairs_of, why_not_exact
 from ..temporal.steppers.exact.varied import VariedMotion
-from ..temporal.steppers.sparse.stepper import with_friction
+from ..temporal.steppers.friction import frictional
 from ..typing import Array
 
 HORIZON = 1e9  # rad of the slowest mode: longer than a motion is ever followed
@@ -92,7 +92,7 @@ class Family:
         if not mu >= 0.0:
             raise AnalysisError(f"μ = {mu:g} is no friction coefficient")
         refuse_undetermined(system, mu, Options(), touching_at=mu)
-        scaled = frictional(system, mu)
+        scaled = frictional(system, mu, full_motion(system))
         pairs = pairs_of(scaled, basis)
         motion = system.motion
         squares = np.abs(basis.stiffness)
@@ -120,14 +120,6 @@ class Family:
             np.vstack([np.zeros((0, system.size)), *free]) @ basis.vectors,
             np.vstack([np.zeros((0, len(motion.names))), *lift]), names,
         )  # fmt: skip
-
-
-def frictional(system: System, mu: float) -> System:
-    """The system with the law of every contact scaled so that it gives μ at its slip speed."""
-    full = full_motion(system)
-    surfaces = [replace(s, nodes=with_friction(s.nodes, mu, full)) for s in system.surfaces]
-    surfaces = tuple(replace(s, law=s.nodes.laws[0]) for s in surfaces)
-    return replace(system.with_friction(mu, np.abs(slip_speeds(system, full))), surfaces=surfaces)
 
 
 def slip_of(system: System) -> Array:

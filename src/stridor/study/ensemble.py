@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..asking import FUNCTION, NUMBER, NUMBERS, SWITCH, TEXT, takes
+from ..case.fields import MOST
 from ..errors import CaseError
 from ..modal.painleve import steps_undetermined
 from ..sliding import full_motion
@@ -100,7 +101,7 @@ def ensemble(
         system, phases_of(work), replace(settings, watch=watch), plan.tracks, seen.see, window=window, cores=cores,
         progress=progress, separately=separately, device=device,
     )  # fmt: skip
-    found = _modes(work, plan) if modes else UnstableMap(None, (), ())
+    found = _modes(work, plan) if modes else UnstableMap(1.0, {}, ())
     made = provenance(work, "ensemble", time.perf_counter() - started, **_asked(values, grid, sweep, swept, window))
     result = _result(work, system, plan, seen, outcome, found, window, made)
     highest = None if np.isnan(plan.rows[:, 0]).all() else float(np.nanmax(plan.rows[:, 0]))
@@ -142,6 +143,8 @@ def _values(
         low = array <= 0.0 if factor else array < 0.0
         if values is not None and (array.ndim != 1 or not len(array) or not np.isfinite(array).all() or low.any()):
             raise CaseError(name, values, f"finite numbers {'above 0' if factor else '≥ 0'}, at least one")
+        if array.max() > MOST:  # as of every number of a case
+            raise CaseError(name, float(array.max()), f"numbers up to {MOST:g}")
         made[name] = array
     return made
 
@@ -233,8 +236,9 @@ class _Seen:
 
 def _modes(work: Workspace, plan: _Plan) -> UnstableMap:
     if np.isnan(plan.rows[:, 0]).any():
-        return UnstableMap(None, (), ("no modal map: contacts have different friction coefficients; name mu",))
-    return unstable_modes(work, [float(v) for v in plan.rows[:, 0]], [float(v) for v in plan.rows[:, 2]])
+        return UnstableMap(1.0, {}, ("no modal map: contacts have different friction coefficients; name mu",))
+    mus, loads, speeds = ([float(v) for v in plan.rows[:, k]] for k in range(3))
+    return unstable_modes(work, mus, speeds, loads)
 
 
 def _result(
@@ -254,7 +258,7 @@ def _result(
             values[k] = getattr(numbers, name)
         for name, values in shares.items():
             values[k] = [getattr(c, f"{name}_fraction") for c in numbers.contacts.values()]
-        growing = found.at(float(plan.rows[k, 0]), float(plan.rows[k, 2]))
+        growing = found.at(float(plan.rows[k, 0]), float(plan.rows[k, 2]), float(plan.rows[k, 1]))
         if growing is not None and numbers.regime in ("steady", "transient", "grows"):
             mode[k], mode_hz[k], deviation[k] = growing.nearest(numbers.frequency_hz)
     separate = () if outcome.side_by_side else (f"separate runs, not side by side: {outcome.reason}",)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,44 +41,88 @@ class UnstableModes:
 
 @dataclass(frozen=True)
 class UnstableMap:
-    """Unstable modes by μ and speed: a map, those at each of its points in the same order, and what is to be said."""
+    """Unstable modes by load: a map over μ and speed, those at each of its points in the same order, and what is to be
+    said. shown: the load of the map that the result has."""
 
-    map: ModalMap | None
-    growing: tuple[tuple[UnstableModes, ...], ...]
+    shown: float
+    of_load: Mapping[float, tuple[ModalMap, tuple[tuple[UnstableModes, ...], ...]]]
     notes: tuple[str, ...]
+    loads_matter: bool = False
 
-    def at(self, mu: float, speed: float) -> UnstableModes | None:
+    @property
+    def map(self) -> ModalMap | None:
+        """The map that the result has, None where it is not known."""
+        found = self.of_load.get(self.shown)
+        return None if found is None else found[0]
+
+    def at(self, mu: float, speed: float, load: float) -> UnstableModes | None:
         """Those of a member; None where it is not known."""
-        if self.map is None:
+        found = self.of_load.get(load if self.loads_matter else self.shown)
+        if found is None:
             return None
-        i = int(np.argmin(np.abs(self.map.mu - mu)))
-        j = int(np.argmin(np.abs(self.map.speed - speed)))
-        return self.growing[i][j] if self.map.unstable[i, j] >= 0 else None
+        at, growing = found
+        i = int(np.argmin(np.abs(at.mu - mu)))
+        j = int(np.argmin(np.abs(at.speed - speed)))
+        return growing[i][j] if at.unstable[i, j] >= 0 else None
 
 
-def unstable_modes(work: Workspace, mus: Sequence[float], speeds: Sequence[float]) -> UnstableMap:
-    """What grows at each μ, and at each speed where friction depends on it. Where that cannot be told, why not."""
+def unstable_modes(
+    work: Workspace, mus: Sequence[float], speeds: Sequence[float], loads: Sequence[float]
+) -> UnstableMap:
+    """What grows at each μ, at each speed where friction depends on it, and at each load where anything does. Where
+    that cannot be told, why not."""
     system = work.system()
     constant = all(c.law.constant for c in system.contacts) and all(s.law.constant for s in system.surfaces)
     values, own = np.unique(mus), np.unique([1.0]) if constant else np.unique(speeds)
+    matter = not constant or _loads_matter(system, prestress=work.options.prestress)
+    factors = [float(f) for f in np.unique(loads)] if matter else [1.0]
+    shown = 1.0 if 1.0 in factors else factors[0]
+    found: dict[float, tuple[ModalMap, tuple[tuple[UnstableModes, ...], ...]]] = {}
+    notes: list[str] = []
+    for factor in factors:
+        at = "" if factors == [1.0] else f" at {factor:g} times the loads"
+        try:
+            found[factor], said = _of_load(work, system, values, own, factor)
+        except StridorError as error:
+            notes.append(f"no modal map{at}: {error}")
+        else:
+            notes += [f"modal map{at}: {note}" for note in dict.fromkeys(said)]
+    if factors != [1.0]:
+        notes.append(
+            f"modes depend on the loads: the modal map is that of {shown:g} times the loads, and mode and mode_hz of "
+            "each member are of the modes at its own"
+        )
+    return UnstableMap(shown, found, tuple(notes), matter)
+
+
+def _loads_matter(system: System, *, prestress: bool) -> bool:
+    """Whether modes at one μ and speed may depend on a factor of all loads, under constant friction: where contact or
+    springs are not linear, or where something else than loads decides which nodes touch."""
+    motion = system.motion
+    return bool(
+        system.cubic is not None or system.contact_cubic or (prestress and system.stress_stiffness is not None)
+        or np.any(system.contact_nodes().gap) or np.any(motion.full_distance) or np.any(motion.damping @ motion.full)
+    )  # fmt: skip
+
+
+def _of_load(
+    work: Workspace, system: System, values: Array, speeds: Array, load: float
+) -> tuple[tuple[ModalMap, tuple[tuple[UnstableModes, ...], ...]], list[str]]:
+    """The map at one factor of all loads, what grows at its points, and what is to be said."""
     columns: list[list[UnstableModes]] = []
     solved: list[BoolArray] = []
     notes: list[str] = []
-    try:
-        for speed in own:
-            at_speed, friction = _at_speed(work, system, values, float(speed))
-            found = modes(at_speed, mu=friction)
-            columns.append([_growing(found, i) for i in range(len(values))])
-            solved.append(found.solved)
-            notes += [said for said, known in zip(found.completeness, found.solved, strict=False) if not known]
-    except StridorError as error:
-        return UnstableMap(None, (), (f"no modal map: {error}",))
+    for speed in speeds:
+        at_speed, friction = _at_speed(work, system, values, float(speed))
+        found = modes(at_speed if load == 1.0 else at_speed.under(load), mu=friction)
+        columns.append([_growing(found, i) for i in range(len(values))])
+        solved.append(found.solved)
+        notes += [said for said, known in zip(found.completeness, found.solved, strict=False) if not known]
     growing = tuple(tuple(column[i] for column in columns) for i in range(len(values)))
     count = np.array([[len(g.mode) for g in row] for row in growing], dtype=np.int64)
     count[~np.column_stack(solved)] = NOT_KNOWN
     fastest = np.array([[_fastest(g) for g in row] for row in growing])
-    told = tuple(f"modal map: {note}" for note in dict.fromkeys(notes))
-    return UnstableMap(ModalMap(values, own, count, fastest[..., 0], fastest[..., 1]), growing, told)
+    return (ModalMap(values, speeds, count, fastest[..., 0], fastest[..., 1], load), growing), notes
 
 
 def _at_speed(work: Workspace, system: System, mus: Array, speed: float) -> tuple[Workspace, Array]:

@@ -31,19 +31,22 @@ NOT_KNOWN = -1  # unstable modes where nothing was solved
 class ModalMap:
     """What the modal approach says over friction, at the speeds of an ensemble: mu (q,), speed (s,) factors; unstable
     (q, s) how many modes grow, NOT_KNOWN (−1) where there is no steady sliding; frequency_hz, growth_rate (q, s) of the
-    fastest, NaN where none grows. Modes do not depend on the speed where friction does not: s is then 1."""
+    fastest, NaN where none grows. Modes do not depend on the speed where friction does not: s is then 1. load: the
+    factor of all loads at which it is; modes of members at other loads are of their own where that matters."""
 
     mu: Array
     speed: Array
     unstable: IntArray
     frequency_hz: Array
     growth_rate: Array
+    load: float = 1.0
 
     def to_json(self) -> dict[str, Any]:
         """Plain values."""
         return {
             "mu": self.mu.tolist(),
             "speed": self.speed.tolist(),
+            "load": self.load,
             "unstable": [[None if n == NOT_KNOWN else n for n in row] for row in self.unstable.tolist()],
             "frequency_hz": [[_plain(v) for v in row] for row in self.frequency_hz],
             "growth_rate": [[_plain(v) for v in row] for row in self.growth_rate],

@@ -8,6 +8,8 @@ case as well.
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
+from dataclasses import replace
 from functools import cached_property, lru_cache, partial
 from os import PathLike
 from typing import Any
@@ -118,6 +120,18 @@ class Workspace(Shown):
 
         Raises what `build_system` raises."""
         return self._build(None if mu is None or not self.varies else float(mu))
+
+    def under(self, factor: float) -> Workspace:
+        """The same under ``factor`` times all loads, with answers of its own."""
+
+        def built(mu: float | None) -> System:
+            system = self._build(mu)
+            return replace(system, loads={name: factor * vector for name, vector in system.loads.items()})
+
+        other = copy(self)
+        other.__dict__.pop("slides", None)  # the one property kept that loads decide
+        other._build, other.answers = lru_cache(SYSTEMS)(built), AnswerCache()
+        return other
 
     @cached_property
     def key(self) -> str:

@@ -45,7 +45,7 @@ class Member:
         for number, phase in enumerate(phases):
             # What the first phase does not name is one.
             loads = {**dict.fromkeys(system.loads, 1.0), **phase.loads} if number == 0 else phase.loads
-            named = dict.fromkeys(system.motion.names, 1.0) if number == 0 else {}
+            named = dict.fromkeys(_velocities(system), 1.0) if number == 0 else {}
             velocities = {**named, **phase.velocities}
             made.append(
                 replace(
@@ -210,6 +210,12 @@ def _rise(step: float, stretches: Sequence[Stretch], ramp: float) -> Schedule:
     return Schedule(step, (rising,))
 
 
+def _velocities(system: System) -> list[str]:
+    """Motions that are velocities: distances, of supports and interferences, are none that a phase scales as such."""
+    distances = system.motion.full_distance
+    return [name for name, distance in zip(system.motion.names, distances, strict=True) if not distance]
+
+
 def leg_phases(legs: Legs, leg: int, member: Member, system: System) -> list[PhaseSpec]:
     """The phases of a leg as a single run takes them, with the factors of a member."""
     if leg == 0:
@@ -218,6 +224,6 @@ def leg_phases(legs: Legs, leg: int, member: Member, system: System) -> list[Pha
     first, *rest = legs.phases[leg]
     whole = sum(p.duration for p in legs.phases[leg])
     loads = {name: member.load * float(f) for name, f in zip(system.loads, full.loads_after, strict=True)}
-    speeds = zip(system.motion.names, full.velocities_after, strict=True)
-    velocities = {name: member.speed * float(f) for name, f in speeds}
+    speeds = dict(zip(system.motion.names, full.velocities_after, strict=True))
+    velocities = {name: member.speed * float(speeds[name]) for name in _velocities(system)}
     return [replace(first, loads=loads, velocities=velocities, ramp=RISE * whole), *rest]

@@ -89,7 +89,7 @@ def simulate(
             schedule = schedule.from_steady()
         march = March(stepper, schedule, settings, join=join, observe=observe)
         if restart is None:
-            stepper.begin(schedule, settings, mu, disturbance)
+            stepper.begin(schedule, settings, disturbance)
         else:
             march.resume(restart, changed=changed)
     return march.run(progress, checkpoint, checkpoint_seconds)

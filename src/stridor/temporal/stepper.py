@@ -85,7 +85,7 @@ class Stepper(Protocol):
         """Take one thread or two, which changes no number."""
         ...
 
-    def begin(self, schedule: Schedule, settings: Settings, mu: float | None, disturbance: Disturbance | None) -> None:
+    def begin(self, schedule: Schedule, settings: Settings, disturbance: Disturbance | None) -> None:
         """Take the initial state. Raises CaseError for a ramp out of steady sliding."""
         ...
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ....errors import AnalysisError, CaseError
-from ....sliding import slip_speeds, steady_sliding
+from ....sliding import steady_sliding
 from ....system import System
 from ....system.uncoupled import no_complete_basis
 from ....typing import Array
@@ -38,7 +38,7 @@ from ...stepper import Disturbance
 from ...trajectory import Trajectory
 from ..basis import Basis
 from ..coordinates import Coordinates, all_modes, left_out, truncated
-from ..sparse.stepper import with_friction
+from ..friction import frictional
 from ..starting import not_begun
 from .drive import pieces
 from .leaps import Leaps
@@ -97,12 +97,7 @@ def exact_stepper(system: System, settings: Settings, mu: float | None, why: str
     """A system made ready, and why this way; mu scales every contact's friction law at its slip speed. Raises CaseError
     for a system that it does not take."""
     refuse(system, settings.cutoff_hz)
-    if mu is not None:
-        full = system.motion.full
-        surfaces = [replace(s, nodes=with_friction(s.nodes, mu, full)) for s in system.surfaces]
-        surfaces = tuple(replace(s, law=s.nodes.laws[0]) for s in surfaces)
-        system = replace(system.with_friction(mu, np.abs(slip_speeds(system, full))), surfaces=surfaces)
-    return ExactStepper(system, settings, why)
+    return ExactStepper(frictional(system, mu), settings, why)
 
 
 def coordinates_of(system: System, cutoff_hz: float | None) -> Coordinates:
@@ -227,7 +222,7 @@ class ExactStepper:
             status=values[:, :, REC_STATUS].astype(np.int64),
         )  # fmt: skip
 
-    def begin(self, schedule: Schedule, settings: Settings, mu: float | None, disturbance: Disturbance | None) -> None:
+    def begin(self, schedule: Schedule, settings: Settings, disturbance: Disturbance | None) -> None:
         """At rest or in steady sliding, disturbed if so asked."""
         self._lay_out(schedule)
         system, motion = self._system, self.motion

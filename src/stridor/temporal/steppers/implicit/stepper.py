@@ -24,7 +24,7 @@ from ...sketch import sketch
 from ...stepper import Disturbance
 from ...trajectory import Trajectory
 from ..coordinates import COMPLETE, Coordinates, coordinates, pushed_at, rows_of
-from ..sparse.stepper import with_friction
+from ..friction import frictional
 from ..starting import OVERLAP
 from .arrays import BY_NEWTON, DONE, KEPT, MOST_SWEEPS, NODES_KEPT, UNCONVERGED, Nodes, Record, StepState, Structure
 from .build import fresh_state, nodes_of, structure_of, work_space
@@ -96,10 +96,8 @@ def implicit_stepper(system: System, settings: Settings, mu: float | None, why: 
     """A system made ready, and why this way; mu scales every contact's friction law at its slip speed. Raises CaseError
     for a system that it does not take."""
     refuse(system, settings)
-    nodes = system.contact_nodes()
-    if mu is not None:
-        nodes = with_friction(nodes, mu, system.motion.full)
-    return ImplicitStepper(system, nodes, settings, why)
+    system = frictional(system, mu)
+    return ImplicitStepper(system, system.contact_nodes(), settings, why)
 
 
 class ImplicitStepper:
@@ -173,14 +171,14 @@ class ImplicitStepper:
     def use_threads(self, *, two: bool) -> None:
         """One thread is what it takes."""
 
-    def begin(self, schedule: Schedule, settings: Settings, mu: float | None, disturbance: Disturbance | None) -> None:
+    def begin(self, schedule: Schedule, settings: Settings, disturbance: Disturbance | None) -> None:
         """At rest, in motion or in steady sliding, disturbed if so asked."""
         _refuse_jumps(schedule)
         system, state = self._system, self.moving
         u, v = np.zeros(system.size), np.zeros(system.size)
         extra = np.zeros(len(state.v))
         if settings.initial == "steady-sliding":
-            u = self._steady(schedule, mu)
+            u = self._steady(schedule)
             for contact in range(len(self.contact_names)):
                 extra += settings.perturbation * self._slip_impulse(contact)
         else:
@@ -193,14 +191,13 @@ class ImplicitStepper:
         self._place_nodes()
         self._refuse_overlap()
 
-    def _steady(self, schedule: Schedule, mu: float | None) -> Array:
+    def _steady(self, schedule: Schedule) -> Array:
         """Displacement (n,) of steady sliding; forces, status and motion of the supports into the state."""
         system, state, stretch = self._system, self.moving, schedule.stretches[0]
         if stretch.ramp_steps:
             raise CaseError("phases.0.ramp", stretch.ramp_steps * schedule.step, "0 when starting from steady sliding")
         steady = steady_sliding(
             system.in_place(stretch.distances_after),
-            mu=mu,
             load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
             motion_factors=stretch.velocities_after,
         )

@@ -116,7 +116,7 @@ class ModalStepper:
         """A contact is one node."""
         return None
 
-    def begin(self, schedule: Schedule, settings: Settings, mu: float | None, disturbance: Disturbance | None) -> None:
+    def begin(self, schedule: Schedule, settings: Settings, disturbance: Disturbance | None) -> None:
         """At rest or in steady sliding, disturbed if so asked."""
         initial_state(self.machine, self.modes, schedule, settings, disturbance)
 

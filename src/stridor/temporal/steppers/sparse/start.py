@@ -21,7 +21,6 @@ def begin(
     machine: Machine,
     schedule: Schedule,
     settings: Settings,
-    mu: float | None,
     disturbance: Disturbance | None,
 ) -> None:
     """Put a machine into its initial state.
@@ -32,7 +31,7 @@ def begin(
     system = machine.system
     u, v, a = np.zeros(system.size), np.zeros(system.size), np.zeros(system.size)
     if settings.initial == "steady-sliding":
-        u, v = _steady(machine, schedule, settings, mu)
+        u, v = _steady(machine, schedule, settings)
     elif own := motion_of_bodies(system, schedule):
         u, v, a = own
     if disturbance is not None:
@@ -45,14 +44,13 @@ def begin(
     machine.mark_start()
 
 
-def _steady(machine: Machine, schedule: Schedule, settings: Settings, mu: float | None) -> tuple[Array, Array]:
+def _steady(machine: Machine, schedule: Schedule, settings: Settings) -> tuple[Array, Array]:
     """Displacement and velocity (n,) of steady sliding, with the perturbation of the slip speed."""
     system, stretch = machine.system, schedule.stretches[0]
     if stretch.ramp_steps:
         raise CaseError("phases.0.ramp", stretch.ramp_steps * schedule.step, "0 when starting from steady sliding")
     steady = steady_sliding(
         system.in_place(stretch.distances_after),
-        mu=mu,
         load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
         motion_factors=stretch.velocities_after,
     )

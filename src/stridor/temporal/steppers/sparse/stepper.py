@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from ....contact.nodes import ContactNodes
 from ....errors import AnalysisError
 from ....system import System
 from ....typing import Array
@@ -22,6 +19,7 @@ from ...sketch import sketch
 from ...stepper import Disturbance
 from ...trajectory import Trajectory
 from ..curve import check_stiffness, left_the_line
+from ..friction import frictional
 from .feet import NEW_ROWS, OFF_LINE
 from .forcing import KEPT, MOST_SWEEPS, NODES_KEPT, STEPS_DONE, UNCONVERGED
 from .limit import step_limit_assembled
@@ -54,24 +52,11 @@ def sparse_stepper(
     lagged = path == "assembled"
     if lagged:
         diagonal_mass(system)
-    nodes = system.contact_nodes()
-    if mu is not None:
-        nodes = with_friction(nodes, mu, system.motion.full)
-    limit = (step_limit_assembled if lagged else step_limit)(system, settings.beta2)
+    limit = (step_limit_assembled if lagged else step_limit)(system, settings.beta2)  # known from other coefficients
+    system = frictional(system, mu)
     numbers = scheme(choose_step(limit, settings), settings.beta2)
     check_stiffness(system, numbers.step)
-    return SparseStepper(assembled_machine(system, numbers, nodes, lagged=lagged), limit, path, reason)
-
-
-def with_friction(nodes: ContactNodes, mu: float, factors: Array) -> ContactNodes:
-    """The same nodes with every contact's law scaled so that it gives ``mu`` at its mean slip speed, with the
-    motions at these factors (p,)."""
-    speed = np.linalg.norm(nodes.slip_velocity(factors), axis=1)
-    laws = tuple(
-        law.scaled(mu, float(speed[nodes.owner == k].mean() if np.any(nodes.owner == k) else 0.0))
-        for k, law in enumerate(nodes.laws)
-    )
-    return replace(nodes, laws=laws)
+    return SparseStepper(assembled_machine(system, numbers, system.contact_nodes(), lagged=lagged), limit, path, reason)
 
 
 class SparseStepper:
@@ -129,9 +114,9 @@ class SparseStepper:
         """Take one thread or two."""
         self.machine.use_threads(two=two)
 
-    def begin(self, schedule: Schedule, settings: Settings, mu: float | None, disturbance: Disturbance | None) -> None:
+    def begin(self, schedule: Schedule, settings: Settings, disturbance: Disturbance | None) -> None:
         """At rest, in motion or in steady sliding, disturbed if so asked."""
-        begin(self.machine, schedule, settings, mu, disturbance)
+        begin(self.machine, schedule, settings, disturbance)
 
     def state(self) -> dict[str, Array]:
         """What moves on from step to step."""
