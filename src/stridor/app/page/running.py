@@ -188,7 +188,7 @@ def _cycles(page: _Page, wish: Wish, work: Workspace) -> None:
     page.breaks_off = False
     keep(found)
     page.tell("stopped" if found.interrupted else "done", {
-        "sentence": found.sentence, "file": None, "missing": found.missing, "notes": (*found.notes, found.reach),
+        "sentence": found.sentence, "file": None, "missing": found.missing, "notes": found.notes,
         "warnings": [] if found.interrupted else found.warnings,
     })  # fmt: skip
 
