@@ -122,11 +122,11 @@ def test_a_map_has_no_count_there() -> None:
 
 
 def test_the_map_of_an_ensemble_has_no_count_there() -> None:
-    found = unstable_modes(Workspace(coupled()), [0.5, 1.0, 1.5], [1.0])
+    found = unstable_modes(Workspace(coupled()), [0.5, 1.0, 1.5], [1.0], [1.0])
     assert found.map is not None
     assert found.map.to_json()["unstable"] == [[0], [1], [None]]
-    assert found.at(1.5, 1.0) is None
-    assert found.at(0.5, 1.0) is not None
+    assert found.at(1.5, 1.0, 1.0) is None
+    assert found.at(0.5, 1.0, 1.0) is not None
     assert any(WHY in note for note in found.notes)
 
 
