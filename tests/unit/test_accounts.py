@@ -88,7 +88,7 @@ def test_works_of_skew_matrices_count_as_put_in() -> None:
 def test_one_run_alone_has_no_spread(monkeypatch) -> None:
     alone = SettledContact(0.0, 1.0, 12, 20.0, Averages(15.0, 1.0, 2.0, 3.0, 0.2, 0.3, 0.5))
     few = SettledContact(0.0, 1.0, 3, 7.0, Averages(None, 1.0, 2.0, 3.0, 0.2, 0.3, 0.5))
-    monkeypatch.setattr(attractor, "settled", lambda run: run)
+    monkeypatch.setattr(attractor, "settled_contacts", lambda run: run)
     found = spread([{"A": alone, "B": few}], 1e-12, 7)  # type: ignore[list-item]
     assert found.mean["A"]["mean_peak_normal_force"] == 15.0
     assert set(found.deviation["A"].values()) == {0.0}

@@ -200,7 +200,7 @@ def by_all_sets(stiffness, force, normal, push, gap) -> list[tuple[np.ndarray, n
 
 def settled(equations: Equilibrium) -> tuple[Equilibrium, NodeEquilibrium, int]:
     nodes: Any = SimpleNamespace(count=equations.nodes.count, kept=equations.nodes.kept, compliance=equations.nodes.compliance)
-    return solution._settled(lambda sign: equations, nodes, np.ones(nodes.count), None, None)
+    return solution._with_friction(lambda sign: equations, nodes, np.ones(nodes.count), None, None)
 
 
 @pytest.mark.parametrize("singular", [False, True])
