@@ -18,109 +18,22 @@ pytestmark = pytest.mark.verification
 
 CASE = """
 units = "nondimensional"
-
-[bodies.m0]
-type = "mass"
-mass = 0.9778
-position = [0.0, 0.0, 0.0]
-
-[bodies.m1]
-type = "mass"
-mass = 1.674
-position = [1.0, 0.0, 0.0]
-
-[bodies.b0]
-type = "obstacle"
-shape = "flat"
-point = [0.002112, -0.02116, 0.006801]
-normal = [-0.0946, 0.9478, -0.3046]
-
-[bodies.b0.sliding]
-velocity = [-0.2017, 0.009529, 0.09231]
-
-[bodies.b1]
-type = "obstacle"
-shape = "flat"
-point = [1.0, 0.0, 0.0]
-normal = [0.459, 0.8306, 0.3154]
-
-[bodies.b1.sliding]
-velocity = [0.2178, -0.1449, 0.06449]
-
-[loads.p0]
-at = "m0"
-force = [0.4999, -0.7988, 0.05715]
-
-[loads.p1]
-at = "m1"
-force = [-0.7191, -2.558, -0.6926]
-
-[contacts.c0]
-slave = "m0"
-master = "b0"
-stiffness = 163.4
-closed = true
-
-[contacts.c0.friction]
-law = "coulomb"
-coefficient = 0.276
-
-[contacts.c1]
-slave = "m1"
-master = "b1"
-stiffness = "rigid"
-closed = true
-
-[contacts.c1.friction]
-law = "coulomb"
-coefficient = 0.4557
-
-[springs.s0]
-between = ["m0", "ground"]
-stiffness = 180.4
-damping = 0.03855
-direction = [-0.7647, 0.06541, 0.6411]
-
-[springs.s1]
-between = ["m0", "ground"]
-stiffness = 73.67
-damping = 0.1214
-direction = [-0.6069, -0.4077, -0.6823]
-
-[springs.s2]
-between = ["m0", "ground"]
-stiffness = 26.39
-damping = 0.01
-direction = [0.2167, -0.9108, 0.3515]
-
-[springs.s3]
-between = ["m1", "ground"]
-stiffness = 184.3
-damping = 0.01
-direction = [-0.8649, 0.1931, 0.4634]
-
-[springs.s4]
-between = ["m1", "ground"]
-stiffness = 41.66
-damping = 0.03037
-direction = [-0.493, -0.5009, -0.7114]
-
-[springs.s5]
-between = ["m1", "ground"]
-stiffness = 63.99
-damping = 0.07771
-direction = [0.09476, -0.8437, 0.5284]
-
-[springs.s6]
-between = ["m1", "m0"]
-stiffness = 69.34
-direction = [-0.1644, -0.98, 0.112]
-
-[modal]
-friction_range = [0.0, 1.5]
-max_frequency_hz = 20.0
-modes = 100
-friction_damping = true
+bodies.m0 = { type = "mass", mass = 0.9778, position = [0.0, 0.0, 0.0] }
+bodies.m1 = { type = "mass", mass = 1.674, position = [1.0, 0.0, 0.0] }
+bodies.b0 = { type = "obstacle", shape = "flat", point = [0.002112, -0.02116, 0.006801], normal = [-0.0946, 0.9478, -0.3046], sliding = { velocity = [-0.2017, 0.009529, 0.09231] } }
+bodies.b1 = { type = "obstacle", shape = "flat", point = [1.0, 0.0, 0.0], normal = [0.459, 0.8306, 0.3154], sliding = { velocity = [0.2178, -0.1449, 0.06449] } }
+loads.p0 = { at = "m0", force = [0.4999, -0.7988, 0.05715] }
+loads.p1 = { at = "m1", force = [-0.7191, -2.558, -0.6926] }
+contacts.c0 = { slave = "m0", master = "b0", stiffness = 163.4, closed = true, friction = { law = "coulomb", coefficient = 0.276 } }
+contacts.c1 = { slave = "m1", master = "b1", stiffness = "rigid", closed = true, friction = { law = "coulomb", coefficient = 0.4557 } }
+springs.s0 = { between = ["m0", "ground"], stiffness = 180.4, damping = 0.03855, direction = [-0.7647, 0.06541, 0.6411] }
+springs.s1 = { between = ["m0", "ground"], stiffness = 73.67, damping = 0.1214, direction = [-0.6069, -0.4077, -0.6823] }
+springs.s2 = { between = ["m0", "ground"], stiffness = 26.39, damping = 0.01, direction = [0.2167, -0.9108, 0.3515] }
+springs.s3 = { between = ["m1", "ground"], stiffness = 184.3, damping = 0.01, direction = [-0.8649, 0.1931, 0.4634] }
+springs.s4 = { between = ["m1", "ground"], stiffness = 41.66, damping = 0.03037, direction = [-0.493, -0.5009, -0.7114] }
+springs.s5 = { between = ["m1", "ground"], stiffness = 63.99, damping = 0.07771, direction = [0.09476, -0.8437, 0.5284] }
+springs.s6 = { between = ["m1", "m0"], stiffness = 69.34, direction = [-0.1644, -0.98, 0.112] }
+modal = { friction_range = [0.0, 1.5], max_frequency_hz = 20.0, modes = 100, friction_damping = true }
 """
 DAMPINGS = ("springs.s0.damping", "springs.s1.damping")
 # Between which μ growth begins, by the truth.

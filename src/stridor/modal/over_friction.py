@@ -220,9 +220,9 @@ def _solved_onsets(
             if held.size > WHOLE or options.source is not None:
                 raise
             return unfollowed(held, between, str(error).partition(";")[0])
-        if not found.completeness and not check:
-            return found
         if not found.completeness:
+            if not check:
+                return found
             found = checked_onsets(
                 held, found, damped=damped, options=options, numbered_at=numbered_at, carried=carried,
                 before=sought_at_end(before, between[0]),
