@@ -10,6 +10,7 @@ import scipy.sparse as sp
 
 from stridor import direct
 from stridor.direct import factor, inertia
+from stridor.direct.bordered import MOST, WithoutRows
 from stridor.errors import AnalysisError, CaseError
 
 solvers = pytest.mark.parametrize("solver", direct.available())
@@ -247,3 +248,42 @@ def test_pivots_without_exchanges_are_believed_only_where_they_answer_exactly(mo
     lossy = inertia.SuperluFactor.solve
     monkeypatch.setattr(inertia.SuperluFactor, "solve", lambda self, b, t: lossy(self, b, t) * (1 if self._checked else 1.01))
     assert direct.negative_eigenvalues(matrix, solver="superlu") is None
+
+
+@solvers
+@pytest.mark.parametrize("shift", [0.0, 3e3])
+def test_rows_are_left_out_by_the_factors_of_all_of_them(solver, shift):
+    """Contacts that open: rows of multipliers, and of freedoms, of a definite matrix and of an indefinite one."""
+    held = sp.csr_array(plate() - shift * sp.eye_array(108))
+    ties = sp.csr_array((np.ones(4), (np.arange(4), [5, 40, 41, 100])), shape=(4, 108))
+    matrix = sp.csr_array(sp.block_array([[held, -1e2 * ties.T], [-1e2 * ties, -1.0 * sp.eye_array(4)]]))
+    factors = direct.counting_factor(matrix, saddle=True, solver=solver)
+    right = rng.standard_normal((112, 3))
+    for left_out in ([109], [108, 111], [3, 50, 110]):
+        stay = np.setdiff1d(np.arange(112), left_out)
+        less = matrix[stay][:, stay]
+        found = WithoutRows.of(factors, 112, np.array(left_out))
+        assert backward_error(less, found.solve(right[stay]), right[stay]) < 1e-12
+        assert found.inertia == int(np.count_nonzero(np.linalg.eigvalsh(less.toarray()) < 0))
+    assert WithoutRows.of(factors, 112, np.arange(MOST + 1)) is None
+
+
+def test_a_matrix_that_is_singular_without_the_rows_is_not_taken_on():
+    one = sp.csr_array([[2.0, 1.0, 0.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1.0]])  # without the last: [[2, 1], [1, 1/2 + ...]]
+    held = sp.csr_array(one - sp.csr_array(([0.5], ([1], [1])), shape=(3, 3)))
+    factors = direct.factorise(held, symmetric=True)
+    assert WithoutRows.of(factors, 3, np.array([2])) is None
+    assert WithoutRows.of(factors, 3, np.array([0])) is not None
+
+
+def test_answers_of_a_symmetric_matrix_need_no_transposed_solve(monkeypatch):
+    asked = []
+    solve = factor.start("superlu").solve
+    monkeypatch.setattr(
+        factor.start("superlu"), "solve", lambda self, right, transpose: asked.append(transpose) or solve(self, right, transpose)
+    )
+    right = rng.standard_normal((108, 2))
+    for symmetric in (True, False):
+        found = direct.factorise(plate(), symmetric=symmetric, solver="superlu").solve(right, transpose=True)
+        assert backward_error(plate(), found, right) < 1e-13
+        assert (True in asked) is not symmetric

@@ -16,6 +16,7 @@ import pytest
 import stridor as st
 from rubbing_block import rubbing_block
 from stridor.app.show_modes import by_stretch
+from stridor.direct import Factor
 from stridor.modal import checked_onsets as checking
 from stridor.modal import krylov as krylov_module
 from stridor.modal import over_friction
@@ -27,7 +28,9 @@ from stridor.modal.full.search import Answer
 from stridor.modal.full.words import _lacking
 from stridor.modal.growing import growing_modes
 from stridor.modal.joined import ALIKE, TouchingChange, joined_onsets, jumps, matched
-from stridor.modal.krylov import Carried
+from stridor.modal.krylov import Carried, kept_factors, refine
+from stridor.modal.krylov import carried as carried_module
+from stridor.modal.krylov.kept_factors import KeptFactors
 from stridor.modal.krylov.problem import problem_of
 from stridor.modal.krylov.refine import GUARD, Band, converge_at, projected
 from stridor.modal.onset import Onset, Onsets
@@ -36,6 +39,7 @@ from stridor.sliding import stretches as finding
 from stridor.sliding.solution import steady_sliding
 from stridor.sliding.stretches import Stretch, stretches
 from stridor.system import System, build_system
+from stridor.typing import Sparse
 
 pytestmark = pytest.mark.verification
 
@@ -390,6 +394,40 @@ def test_gaps_stay_closed_on_a_basis_that_is_handed_on_again_and_again() -> None
     assert widest < 1e-13
 
 
+@pytest.mark.parametrize("solver", ["superlu", None])
+def test_nodes_that_open_are_left_out_of_factors_that_are_kept(solver: str | None, monkeypatch) -> None:
+    """The same shapes and the same number of modes as by factors of the problem itself, and none of these are made."""
+    system, frictions = build_system(coarse(0.45)), np.linspace(0.0, 0.45, 5)
+    problems = [problem_of(system, mu, Options(solver=solver), frictions=frictions) for mu in (0.1, 0.35, 0.45)]
+    assert np.all(np.diff([p.nodes for p in problems]) < 0)
+    shift, square, kept = -((2 * np.pi * 2e3) ** 2), (2 * np.pi * 9e3) ** 2, KeptFactors()
+    kept.solving(problems[0], shift)
+    first = kept.negative(problems[0], square)
+    made: list[Sparse] = []
+    for name in ("factorise", "counting_factor"):
+        monkeypatch.setattr(kept_factors, name, lambda matrix, **_: made.append(matrix))
+    answers = [kept.solving(p, shift) for p in problems]
+    counts = [kept.negative(p, square) for p in problems]
+    assert not made
+    monkeypatch.undo()
+    assert counts[0] == first
+    for problem, (solving, scale), count in zip(problems, answers, counts, strict=True):
+        assert count == KeptFactors().negative(problem, square)
+        matrix, own = kept_factors.matrix_at(problem, shift)
+        assert own == scale
+        right = np.random.default_rng(5).standard_normal((matrix.shape[0], 2))
+        answer = solving.solve(right)
+        assert np.max(np.abs(matrix @ answer - right) / (abs(matrix) @ np.abs(answer) + np.abs(right))) < 1e-12
+    # Nodes that come to touch, and another stiffness, need factors of their own.
+    kept.solving(problems[1], shift)
+    last = KeptFactors()
+    last.solving(problems[1], shift)
+    for other in (problems[0], replace(problems[2], stiffness=1.5 * problems[2].stiffness)):
+        solving, _ = last.solving(other, shift)
+        assert isinstance(solving, Factor)
+        last.solving(problems[1], shift)
+
+
 def test_shapes_that_the_full_problem_has_at_the_high_end_save_solving_for_them(monkeypatch: pytest.MonkeyPatch) -> None:
     def counted(known: bool) -> tuple[st.Onsets, list[int]]:
         """The onsets, and the right sides that each stretch took."""
@@ -409,6 +447,22 @@ def test_shapes_that_the_full_problem_has_at_the_high_end_save_solving_for_them(
     (found, fewer), (plain, solves) = counted(True), counted(False)
     assert len(fewer) == len(solves) > 1
     assert sum(fewer) < 0.8 * sum(solves), (fewer, solves)
+    assert [o.mu for o in found] == pytest.approx([o.mu for o in plain], rel=1e-9)
+
+
+def test_what_an_opened_node_does_is_taken_in_before_modes_are_swept(monkeypatch: pytest.MonkeyPatch) -> None:
+    def counted() -> tuple[st.Onsets, int]:
+        """The onsets, and how often modes were looked at."""
+        looks: list[float] = []
+        unbalanced = refine.unbalanced
+        with monkeypatch.context() as patch:
+            patch.setattr(refine, "unbalanced", lambda r, mu, *a, **k: looks.append(mu) or unbalanced(r, mu, *a, **k))
+            return st.onsets(coarse(0.45)), len(looks)
+
+    found, fewer = counted()
+    monkeypatch.setattr(carried_module, "LEVELS", 0)
+    plain, looks = counted()
+    assert fewer < 0.9 * looks, (fewer, looks)
     assert [o.mu for o in found] == pytest.approx([o.mu for o in plain], rel=1e-9)
 
 

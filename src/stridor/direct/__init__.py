@@ -5,7 +5,16 @@ Whichever program does the work, answers are refined to a small backward error a
 
 from .backends import available, join
 from .factor import Factor, SingularMatrix, factorise
-from .inertia import negative_eigenvalues
+from .inertia import counting_factor, negative_eigenvalues
 from .nearby import Nearby
 
-__all__ = ["Factor", "Nearby", "SingularMatrix", "available", "factorise", "join", "negative_eigenvalues"]
+__all__ = [
+    "Factor",
+    "Nearby",
+    "SingularMatrix",
+    "available",
+    "counting_factor",
+    "factorise",
+    "join",
+    "negative_eigenvalues",
+]

@@ -53,7 +53,7 @@ class Sizes:
     def of(matrix: Sparse, largest: tuple[Array, Array] | None = None) -> Sizes:
         """Those of a matrix in csr form, whose largest entries may be known."""
         entries = sp.csr_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
-        return Sizes(entries, *(largest or _largest(matrix)))
+        return Sizes(entries, *(largest or largest_entries(matrix)))
 
     @property
     def transposed(self) -> Sizes:
@@ -85,9 +85,11 @@ class Factor:
     memory_bytes: int
 
     def __init__(
-        self, matrix: Sparse, backend: Backend, solver: str, started: float, largest: tuple[Array, Array]
-    ) -> None:
+        self, matrix: Sparse, backend: Backend, solver: str, started: float, largest: tuple[Array, Array],
+        symmetric: bool,
+    ) -> None:  # fmt: skip
         self._matrix = matrix
+        self._symmetric = symmetric
         self._sizes = Sizes.of(matrix, largest)
         self._backend: Backend | None = backend
         self.solver = solver
@@ -109,6 +111,8 @@ class Factor:
         if given.ndim not in (1, 2) or given.shape[0] != n:
             raise ValueError(f"the right side has shape {given.shape}; expected ({n},) or ({n}, r)")
         block = given[:, None] if given.ndim == 1 else given
+        # Of A = Aᵀ the answers are the same, and SuperLU takes three times as long for the transposed ones.
+        transpose = transpose and not self._symmetric
         if self._matrix.dtype.kind == "f" and block.dtype.kind == "c":
             r = block.shape[1]
             parts = self._solve_block(np.concatenate([block.real, block.imag], axis=1), transpose, refine)
@@ -238,7 +242,7 @@ def factorise(
         raise AnalysisError("the matrix has entries that are not finite numbers")
     # What other programs take of the machine is not the solver's.
     started, worked = time.perf_counter(), time.process_time()
-    largest = _largest(held)
+    largest = largest_entries(held)
     empty = np.flatnonzero((largest[0] == 0) | (largest[1] == 0))
     if len(empty):
         motion = np.zeros(held.shape[0])
@@ -247,13 +251,13 @@ def factorise(
     if symmetric:
         _require_symmetry(held)
     try:
-        factor = Factor(held, begin(held, symmetric, saddle), name, started, largest)
+        factor = Factor(held, begin(held, symmetric, saddle), name, started, largest, symmetric)
         ratio, motion = factor.unresisted() if held.shape[0] and tried else (1.0, None)
     except Breakdown:
         # Enough on the diagonal to get through: solved with that, the matrix still shows what it does not resist.
         stiffened = sp.csr_array(held + sp.diags_array(1e-3 * PERTURBED * largest[0]))
         try:
-            factor = Factor(held, begin(stiffened, symmetric, saddle), name, started, largest)
+            factor = Factor(held, begin(stiffened, symmetric, saddle), name, started, largest, symmetric)
             ratio, motion = 0.0, factor.unresisted()[1]
         except Breakdown as error:
             raise SingularMatrix("the matrix is singular: elimination meets a pivot of zero") from error
@@ -261,11 +265,16 @@ def factorise(
         _log.info("%s: %d unknowns in %.1f s, %.0f MB", name, held.shape[0], factor.seconds, factor.memory_bytes / 1e6)
     if name == "superlu" and time.process_time() - worked > SLOW and not (installed("mumps") or installed("pardiso")):
         _say_what_is_faster()
+    require_regular(factor, ratio, motion)
+    return factor
+
+
+def require_regular(factor: Factor, ratio: float, motion: Any) -> None:
+    """Free the factors and raise SingularMatrix where `Factor.unresisted` found a motion that nothing resists."""
     if ratio < SINGULAR:
         factor.free()
         at = "" if motion is None else f"; nothing resists a motion of freedom {int(np.argmax(np.abs(motion)))}"
         raise SingularMatrix(f"the matrix is singular to working precision{at}", motion)
-    return factor
 
 
 @cache
@@ -279,7 +288,7 @@ def _say_what_is_faster() -> None:
 
 
 
-def _largest(matrix: Sparse) -> tuple[Array, Array]:
+def largest_entries(matrix: Sparse) -> tuple[Array, Array]:
     """The largest entries of the rows and of the columns (n,); SciPy's own way takes ten times longer."""
     size = np.abs(matrix.data)
     rows, columns = np.zeros(matrix.shape[0]), np.zeros(matrix.shape[1])

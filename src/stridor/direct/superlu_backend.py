@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -54,6 +55,11 @@ class SuperluFactor:
 
     @property
     def inertia(self) -> int | None:
+        """Number of negative eigenvalues, where it is told."""
+        return self._negative
+
+    @cached_property
+    def _negative(self) -> int | None:
         """A = L U with rows and columns in one order is L D Lᵀ, and D has the signs of the eigenvalues (Sylvester)."""
         straight = self._symmetric and np.array_equal(self._factor.perm_r, self._factor.perm_c)
         # Rows and columns are scaled alike where the matrix is symmetric, by positive numbers.

@@ -44,7 +44,7 @@ class Growing:
 
     beside (l,): eigenvalues within rounding and a little below of the axis. complete: whether the search vouches for
     there being no other; sentence: what speaks for that. top [1/s]: how far the band had to be searched.
-    shapes (n, k): right vectors of all modes found, whether they grow or not.
+    shapes (n, l): right vectors of all modes found, whether they grow or not, and of others found on the way.
     fastest [1/s]: up to which growth it was. sought: whether it was; else these are branches, which agree with what
     was found beside them. still [1/s]: up to which |λ| eigenvalues may be motions as a whole.
     """
@@ -123,7 +123,7 @@ def _searched_for(
         top,
         fastest=found.completeness.searched.re_max,
         still=limit,
-        shapes=found.right[: problem.size],
+        shapes=np.hstack([found.right, *([] if found.beside is None else [found.beside])])[: problem.size],
     )
 
 

@@ -209,6 +209,7 @@ def _solved_onsets(
     def solved(held: System, between: tuple[float, float], before: Onsets | None = None) -> Onsets:
         # Behind a border branches have the names that they had before it.
         numbered_at = 0.0 if before is None else between[0]
+        carried.inner = before is not None, between[1] < friction_range[1]
         if check:
             carried.at_end = partial(_shapes_at, held, between[1], max_frequency_hz, damped, options)
         try:

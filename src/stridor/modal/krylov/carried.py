@@ -9,31 +9,39 @@ counted anew, whichever way a basis began.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.linalg as sl
+import scipy.sparse as sp
 
 from ...errors import AnalysisError
-from ...typing import Array, ComplexArray, IntArray
+from ...typing import Array, ComplexArray, Sparse
+from .forces import principal
+from .kept_factors import KeptFactors
 from .problem import ContactProblem
 from .reduced import Reduced
 from .shifted import ForcedShapes, Shifted, real_columns
 
+LEVELS = 3  # of what answers to the forces of nodes that changed
+MOST_CHANGED = 8  # of these forces; of more the sweeps make fewer vectors
 STIFFEST = 1e3  # times the structure's stiffness: forces of contact stiffer than that are not told by its displacement
 
 
 @dataclass
 class Carried:
-    """Shapes that the last basis had, with forces of the nodes that ``touching`` names, frictionless modes first, of
-    which there are ``modes``, for a band up to ``frequency`` [1/s]; empty at first. at_end: asked for exact shapes
-    (n, k) at the high end of the stretch, which the full problem is solved for anyhow; None where it has none."""
+    """Shapes that the last basis had, with the forces of its ``problem``, frictionless modes first, of which there are
+    ``modes``, for a band up to ``frequency`` [1/s]; empty at first. at_end: asked for exact shapes
+    (n, k) at the high end of the stretch, which the full problem is solved for anyhow; None where it has none. factors:
+    those of the stretches before, for where nodes only open."""
 
     at_end: Callable[[], ComplexArray | None] | None = None
     shapes: ForcedShapes | None = None
-    touching: IntArray | None = None
+    problem: ContactProblem | None = None
     modes: int = 0
     frequency: float = 0.0
+    factors: KeptFactors = field(default_factory=KeptFactors)
+    inner: tuple[bool, bool] = (False, False)
 
     def exact_at_end(self, problem: ContactProblem) -> ForcedShapes | None:
         """What ``at_end`` gives, in real columns with forces of contact that close the gaps; None without it."""
@@ -52,14 +60,15 @@ class Carried:
     def basis(self, problem: ContactProblem, shifted: Shifted, top: float, highest: float) -> tuple[Reduced, Array]:
         """The problem on them, and ω² (k,) of its modes without friction, ascending."""
         assert self.shapes is not None, "only where they fit"
-        assert self.touching is not None, "they have forces"
+        assert self.problem is not None, "they have forces"
         forces = -(problem.normal @ self.shapes.u) / problem.compliance[:, None]
-        _, now, before = np.intersect1d(problem.touching, self.touching, return_indices=True)
+        _, now, before = np.intersect1d(problem.touching, self.problem.touching, return_indices=True)
         forces[now] = self.shapes.p[before]
         every = ForcedShapes(self.shapes.u, forces)
         first = np.eye(every.count)[:, : self.modes]
         reduced = Reduced(problem, shifted, every.combined(first), top, highest)
         reduced.add(every.combined(np.eye(every.count)[:, self.modes :]))
+        _answer(reduced, _changed(self.problem, problem))
         return reduced, _frictionless(reduced)[0]
 
     def take(self, reduced: Reduced, beyond: float) -> None:
@@ -67,8 +76,30 @@ class Carried:
         squares, vectors = _frictionless(reduced)
         near = vectors[:, squares <= (beyond * reduced.frequency) ** 2]
         self.shapes = reduced.pairs.combined(np.hstack([near, reduced.exact]))
-        self.touching = reduced.problem.touching
+        self.problem = reduced.problem
         self.modes, self.frequency = near.shape[1], reduced.frequency
+
+
+def _changed(before: ContactProblem, now: ContactProblem) -> Array:
+    """Forces (n, k) along the normals and the slip of nodes that touch in one of two problems alone."""
+    rows: list[Sparse] = []
+    for one, other in ((before, now), (now, before)):
+        alone = np.flatnonzero(~np.isin(one.touching, other.touching))
+        rows += [one.normal[alone], one.slip[alone]]
+    return np.asarray(sp.vstack(rows, format="csr").T.toarray())
+
+
+def _answer(reduced: Reduced, force: Array) -> None:
+    """Take in what forces (n, k) do, and what inertia and friction of that do in turn: a node that opens changes modes
+    by these, which sweeps over all modes would bring one after the other."""
+    problem = reduced.problem
+    if not 0 < force.shape[1] <= MOST_CHANGED:
+        return
+    for _ in range(LEVELS):
+        answer = ForcedShapes(*reduced.shifted.solve(principal(problem, force)))
+        reduced.solves += answer.count
+        reduced.add(answer)
+        force = np.hstack([reduced.frequency**2 * (problem.mass @ answer.u), problem.slide.T @ answer.p])
 
 
 def _tells_forces(problem: ContactProblem) -> bool:

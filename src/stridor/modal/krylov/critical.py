@@ -82,7 +82,8 @@ def krylov_onsets(
     keep_standing(system, options or Options(), reduced.shifted)
     at_end = None if carried is None else carried.exact_at_end(problem)
     frictions = numbered_at + samples(high - numbered_at, _count_of_samples(numbered_at, high))
-    converge_over(reduced, frictions, at_end=at_end)
+    inner = (False, False) if carried is None else carried.inner
+    converge_over(reduced, frictions, at_end=at_end, inner=inner)
     if carried is not None:
         carried.take(reduced, GUARD)
     telling = reduced.narrowed(TELLING)

@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.linalg as sl
 import scipy.sparse as sp
 
 from ...direct import factorise
@@ -18,6 +17,8 @@ from ..pencil import tiny
 from ..quadratic.problem import times
 from ..tolerances import BELIEVED
 from .carried import Carried
+from .forces import lumped, principal
+from .kept_factors import KeptFactors
 from .problem import ContactProblem
 from .reduced import Reduced
 from .shifted import ForcedShapes, Shifted, frictionless_modes, modes_below, real_columns, shift_for
@@ -29,8 +30,6 @@ LARGEST_REST = 1e-4  # and what it may leave of the lumped inertia forces
 SWEEPS = 40
 IDLE = 4  # sweeps in a row that do not halve what is left: it is rounding
 RUINED = 1e4  # times the least that was left: the basis has taken rounding in
-WIDEST = 64  # right sides of one enrichment
-WEAKEST = 1e-3  # of the strongest direction: residuals below it wait for the next sweep
 COUNTED = 20_000  # freedoms up to which the number of frictionless modes is checked, by one more factorisation
 GROWN = 1.4  # a basis this much larger than when it was last reduced is reduced again
 MARGIN = 1.1  # modes up to this much above the band are made exact
@@ -66,17 +65,18 @@ def projected(
 ) -> Reduced:
     """The problem on its frictionless modes up to beyond the band, and on what their friction forces do to it, for μ
     up to ``highest``; on what was carried from a neighbouring problem where that holds all of its modes."""
-    shifted = Shifted(problem, shift_for(problem, band.frequency))
+    kept = None if carried is None else carried.factors
+    shifted = Shifted(problem, shift_for(problem, band.frequency), kept)
     if carried is not None and band.frequency is not None and carried.fit(problem, band.frequency):
         reduced, squares = carried.basis(problem, shifted, band.frequency, highest)
         # Far above the band the values of this basis are nobody's.
-        counted = _counted(problem, squares[squares <= (GUARD * band.frequency) ** 2], band.frequency)
+        counted = _counted(problem, squares[squares <= (GUARD * band.frequency) ** 2], band.frequency, kept)
         if counted is not None and counted.number == counted.found:
             return reduced
     squares, modes = frictionless_modes(shifted, band.enough)
     top = band.top(squares)
     if problem.size <= COUNTED:
-        _require_all(problem, squares, top)
+        _require_all(problem, squares, top, kept)
     reduced = Reduced(problem, shifted, modes, top, highest)
     near = squares <= (MARGIN * top) ** 2
     if problem.nodes and near.any():
@@ -85,9 +85,9 @@ def projected(
     return reduced
 
 
-def _require_all(problem: ContactProblem, squares: Array, top: float) -> None:
+def _require_all(problem: ContactProblem, squares: Array, top: float, kept: KeptFactors | None) -> None:
     """Raise AnalysisError where block Lanczos has missed a mode."""
-    told = _counted(problem, squares, top)
+    told = _counted(problem, squares, top, kept)
     if told is not None and told.number != told.found:
         raise AnalysisError(
             f"{told.number} frictionless modes lie below {told.below_hz:.6g} Hz but {told.found} were found; change "
@@ -104,15 +104,21 @@ class _ModeCount:
     below_hz: float
 
 
-def _counted(problem: ContactProblem, squares: Array, top: float) -> _ModeCount | None:
+def _counted(
+    problem: ContactProblem, squares: Array, top: float, kept: KeptFactors | None = None
+) -> _ModeCount | None:
     """The number of frictionless modes, known without finding them, beside ω² (k,) found; None where it is not told."""
-    above = np.flatnonzero(squares > top**2)
-    if len(above) < 2:
+    first = int(np.searchsorted(squares, top**2, side="right"))
+    if len(squares) - first < 2:
         return None
-    # Between the two modes that are furthest apart, so that rounding does not decide which side they are on.
-    k = int(above[np.argmax(np.diff(squares[above]))])
-    number = modes_below(problem, float(squares[k] + squares[k + 1]) / 2)
-    return None if number is None else _ModeCount(number, k + 1, float(np.sqrt(squares[k])) / (2 * np.pi))
+    between = None if kept is None else kept.dividing(squares, first)
+    if between is None:
+        # Between the two modes that are furthest apart, so that rounding does not decide which side they are on.
+        k = first + int(np.argmax(np.diff(squares[first:])))
+        between = float(squares[k] + squares[k + 1]) / 2
+    found = int(np.searchsorted(squares, between))
+    number = modes_below(problem, between, kept)
+    return None if number is None else _ModeCount(number, found, float(np.sqrt(squares[found - 1])) / (2 * np.pi))
 
 
 def wanted(reduced: Reduced, found: Eigenpairs) -> IntArray:
@@ -174,23 +180,26 @@ def converge_at(
 
 def converge_over(
     reduced: Reduced, frictions: Array, *, between: float = GROWTH, left: bool = False,
-    at_end: ForcedShapes | None = None,
+    at_end: ForcedShapes | None = None, inner: tuple[bool, bool] = (False, False),
 ) -> None:  # fmt: skip
     """`converge_at` over a range: exact at its ends, up to a backward error ``between`` them; each μ in the middle of
-    those before, so that most find nothing left to do. at_end: shapes that are known at the high end."""
+    those before, so that most find nothing left to do. at_end: shapes that are known at the high end. inner: whether
+    the low and the high end are borders with other ranges, and need no more than what is between."""
     values = np.unique(frictions)
+    low, high = (between if within else TOLERANCE for within in inner)
     if at_end is None:
-        converge_at(reduced, values[[-1, 0]], left=left)
+        converge_at(reduced, values[[-1]], tolerance=high, left=left)
+        converge_at(reduced, values[[0]], tolerance=low, left=left)
     else:  # which the low end, often that of a basis handed on, would only be slowed down by
-        converge_at(reduced, values[[0]], left=left)
+        converge_at(reduced, values[[0]], tolerance=low, left=left)
         reduced.add(at_end)
-        converge_at(reduced, values[[-1]], left=left)
+        converge_at(reduced, values[[-1]], tolerance=high, left=left)
     parts = [(0, len(values) - 1)]
-    for low, high in parts:
-        if high - low > 1:
-            middle = (low + high) // 2
+    for first, last in parts:
+        if last - first > 1:
+            middle = (first + last) // 2
             converge_at(reduced, [values[middle]], tolerance=between, left=left)
-            parts += [(low, middle), (middle, high)]
+            parts += [(first, middle), (middle, last)]
 
 
 @dataclass(frozen=True)
@@ -273,20 +282,3 @@ def fitted(rows: Sparse, rest: ComplexArray) -> ComplexArray:
     """Forces (m, k) on rows (m, n) that come closest to ``rest`` (n, k): least squares by the normal equations."""
     with factorise(sp.csr_array(rows @ rows.T), symmetric=True) as factor:
         return factor.solve(times(rows, rest))
-
-
-def principal(problem: ContactProblem, forces: Array) -> Array:
-    """The few directions (n, l) that the forces (n, k) mostly have, weighted by their compliance in the lumped mass."""
-    if not forces.shape[1]:
-        return forces
-    scaled = forces / np.sqrt(lumped(problem))[:, None]
-    gram = scaled.T @ scaled
-    squares, vectors = sl.eigh(gram)
-    keep = np.flatnonzero(squares > WEAKEST**2 * squares[-1])[-WIDEST:]
-    return forces @ (vectors[:, keep] / np.sqrt(squares[keep]))
-
-
-def lumped(problem: ContactProblem) -> Array:
-    """Diagonal masses (n,), massless freedoms given a little."""
-    diagonal = problem.mass.diagonal()
-    return np.maximum(diagonal, 1e-6 * float(diagonal.mean()) + 1e-300)

@@ -15,13 +15,13 @@ import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 
-from ...direct import factorise, negative_eigenvalues
 from ...errors import AnalysisError
 from ...stages import passing, stage
 from ...system import System
-from ...typing import Array, Sparse
+from ...typing import Array
 from ..dense_problem import combined
 from ..options import Options
+from .kept_factors import KeptFactors
 from .problem import ContactProblem
 
 BLOCK = 24  # right sides solved for at once while modes are sought
@@ -76,11 +76,10 @@ class Shifted:
     Multipliers are scaled to the stiffness inside, so that the factorisation is well balanced.
     """
 
-    def __init__(self, problem: ContactProblem, shift: float) -> None:
+    def __init__(self, problem: ContactProblem, shift: float, kept: KeptFactors | None = None) -> None:
         self.problem = problem
         self.shift = shift
-        matrix, self._scale = _matrix(problem, shift)
-        self._factor = factorise(matrix, symmetric=True, saddle=problem.nodes > 0, solver=problem.solver)
+        self._factor, self._scale = (kept or KeptFactors()).solving(problem, -shift)
 
     @property
     def positive(self) -> bool:
@@ -130,30 +129,18 @@ def standing_at(system: System, options: Options) -> float:
     return math.inf if known is None else float(known)
 
 
-def _matrix(problem: ContactProblem, shift: float) -> tuple[Sparse, float]:
-    """A₀, and the scale of its multipliers."""
-    matrix = sp.csr_array(problem.stiffness + shift * problem.mass)
-    scale = float(np.abs(matrix.diagonal()).mean()) or 1.0
-    if problem.nodes:
-        normal = sp.csr_array(-scale * problem.normal)
-        corner = sp.diags_array(-(scale**2) * problem.compliance, format="csr")
-        matrix = sp.block_array([[matrix, normal.T], [normal, corner]], format="csr")
-    return matrix, scale
-
-
 # Of the displacements a gap is made of: as far as it is known.
 ROUNDING = 16 * float(np.finfo(float).eps)
 # Squared length, of one, that a shape must have apart from the others.
 APART = 1e-8
 
 
-def modes_below(problem: ContactProblem, square: float) -> int | None:
+def modes_below(problem: ContactProblem, square: float, kept: KeptFactors | None = None) -> int | None:
     """How many frictionless modes have ω² below ``square`` [1/s²], by the signs of pivots (Sylvester's law of inertia).
 
-    None where the solver does not tell them.
+    kept: factors that may serve. None where the solver does not tell the signs.
     """
-    matrix, _ = _matrix(problem, -square)
-    told = negative_eigenvalues(matrix, saddle=problem.nodes > 0, solver=problem.solver)
+    told = (kept or KeptFactors()).negative(problem, square)
     return None if told is None else told - problem.nodes
 
 

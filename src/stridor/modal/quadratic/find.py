@@ -64,8 +64,9 @@ class RegionModes:
     """Eigenvalues (k,) [1/s] sorted by imaginary, then real part; of conjugate pairs the one with Im λ ≥ 0.
 
     right (n, k): P(λ)x = 0; left (n, k): yᵀP(λ) = 0, transposed and not conjugated; both of unit norm. residual and
-    left_residual (k,): componentwise backward errors. factorisations, solves (single right sides), seconds and
-    memory_bytes (of the factors held at one time) tell what it cost.
+    left_residual (k,): componentwise backward errors. beside (n, l): shapes found on the way of eigenvalues outside the
+    region, of which nothing is claimed. factorisations, solves (single right sides), seconds and memory_bytes (of the
+    factors held at one time) tell what it cost.
     """
 
     values: ComplexArray
@@ -78,6 +79,7 @@ class RegionModes:
     solves: int
     seconds: float
     memory_bytes: int
+    beside: ComplexArray | None = None
 
 
 @one_thread
@@ -116,7 +118,7 @@ def find_modes(
     return RegionModes(
         values, right, y, problem.backward_error(values, right),
         None if y is None else problem.transposed.backward_error(values, y), evidence(undamped),
-        run.factorisations, run.solves, time.perf_counter() - started, run.memory,
+        run.factorisations, run.solves, time.perf_counter() - started, run.memory, run.beside,
     )  # fmt: skip
 
 
@@ -158,6 +160,7 @@ class _RegionSearch:
     memory: int = 0
     sites: list[_Site] = field(default_factory=list)
     alive: int = 0
+    beside: ComplexArray | None = None
 
     @property
     def padded(self) -> Region:
@@ -221,6 +224,7 @@ class _RegionSearch:
 
         for site in self.sites:
             site.factor.free()
+        self.beside = np.hstack([site.searches[0].beside for site in self.sites])
         return sides, evidence
 
     def chosen(self, sides: list[DiscModes]) -> tuple[ComplexArray, ComplexArray, ComplexArray | None]:

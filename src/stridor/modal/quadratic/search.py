@@ -55,6 +55,7 @@ class Search:
     later: int = 0  # eigenvalues that only a second look brought
     seed: int = SEED
     found: DiscModes = field(init=False)
+    beside: ComplexArray = field(init=False)  # (n, l), see `RegionModes`
     disc: Disc = field(init=False)
     guards: ComplexArray = field(init=False)  # Ritz values outside the disc that have nearly converged
     _values: ComplexArray = field(init=False)
@@ -157,6 +158,8 @@ class Search:
         self._values = values[inside]
         self.found = DiscModes(values[kept], shapes, error)
         self.guards = values[nearly & ~kept]
+        others = np.flatnonzero(nearly & ~kept & (values.imag >= 0))
+        self.beside = krylov.shapes(theta[others], vectors[:, others])
         return True, 0
 
     def _patience(self) -> float:
