@@ -11,6 +11,7 @@ from scipy.spatial import Delaunay
 
 import stridor as st
 from random_sectors import Ring, random_ring
+from stridor.app.conclusions import of_modes, of_onsets
 from stridor.case import loads
 from stridor.errors import AnalysisError, StridorError
 
@@ -204,3 +205,20 @@ ramp = 1e-5
         force.append(run.normal_force.sum(axis=1))
     assert ring.sectors * force[0] == pytest.approx(force[1], rel=1e-6, abs=1e-6 * force[1].max())
     assert force[1][-1] > 0.0
+
+
+def test_what_is_said_of_a_sector_is_said_of_motions_alike_in_all_sectors_alone():
+    """The whole ring squeals from μ = 0 on in motions that its sector has not."""
+    ring = random_ring(4, dimension=2, rigid=False)
+    sector, whole = (loads(text).with_({"modal.max_frequency_hz": 30e3}) for text in (ring.sector, ring.whole))
+    one, some, every = st.onsets(sector, (0.0, 0.6)), st.modes(sector, 0.4), st.modes(whole, 0.4)
+    assert not one
+    assert not some.unstable.any()
+    assert every.unstable.any()
+    for said in (one.completeness, some.completeness[0]):
+        assert said.endswith(" All of that is of motions alike in all sectors alone (ties.one).")
+    assert str(of_onsets(one).sentence).endswith("up to 30000 Hz, of motions alike in all sectors")
+    assert of_modes(some, "0.4").sentence.endswith("at μ = 0.4, of motions alike in all sectors")
+    assert any(said.startswith("ties.one: bodies repeat") for said in sector.warnings)
+    for said in (every.completeness[0], of_modes(every, "0.4").sentence, *whole.warnings):
+        assert "alike" not in said

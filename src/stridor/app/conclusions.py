@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..case.repeating import ALIKE, is_of_alike
 from ..digits import fixed, measured, readable
 from ..notebook import counted
 from .closing import Conclusion
@@ -43,6 +44,8 @@ def of_modes(result: ComplexModes, mu: str | None, *, drawn: bool = True, rubs: 
     rate = np.where(growing, result.growth_rate, -np.inf)
     unsure = any(doubt(said) for said in result.completeness)
     caution = "; not all of it was checked, see above" if unsure else ""
+    if any(is_of_alike(said) for said in result.completeness):
+        caution = f", of {ALIKE}{caution}"
     if len(result.mu) > 1:
         some = growing.any(axis=1)
         # Where there is no steady sliding nothing is stable or unstable: those μ are not counted.
@@ -73,6 +76,7 @@ def of_onsets(result: Onsets) -> Conclusion:
     """From which μ on something grows; then the modes there."""
     low, high = result.friction_range
     over = f"for μ in {low:g} … {high:g} {result.frequencies}"
+    over += f", of {ALIKE}" if is_of_alike(result.completeness) else ""
     if result.at_start_words:
         return Conclusion(f"unstable from the start of the range, μ = {low:g}", "modes", ("--mu", f"{low:g}"))
     first = result.first

@@ -108,7 +108,7 @@ class Case(Shown, Table):
 
     @property
     def warnings(self) -> list[str]:
-        """One line for each value that is allowed but probably not meant (units, digits)."""
+        """One line for each value that is allowed but probably not meant (units, digits), or for what is left out."""
         return list(oddities(self))
 
     @property

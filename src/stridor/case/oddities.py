@@ -26,6 +26,7 @@ from .bodies import (
 from .checks import signed_distance
 from .extent import extent_of
 from .points import BoundaryRef, PointRef, parse_location
+from .repeating import repeating, repeating_words
 from .schema import Load
 from .usual import LENGTH, unusual
 
@@ -49,6 +50,7 @@ def oddities(case: Case) -> Iterator[str]:
     Numbers with a unit are looked at in cases in SI units only: those that have a material or a mesh, unless they say
     units = "nondimensional".
     """
+    yield from repeating_words(repeating(case.ties))
     scaled = in_si_units(case)
     for table in ("materials", "bodies", "supports", "loads"):
         for name, entry in getattr(case, table).items():

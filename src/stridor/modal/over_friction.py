@@ -13,6 +13,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..case.repeating import of_alike
 from ..errors import AnalysisError, FollowingError
 from ..sliding.stretches import Stretch, stretch_words, stretches
 from ..system import System
@@ -53,6 +54,9 @@ def modes_of_band(
     options = options or Options()
     values = np.atleast_1d(np.asarray(mu, dtype=float))
 
+    def said(found: ComplexModes) -> ComplexModes:
+        return replace(found, completeness=tuple(of_alike(each, system.repeating) for each in found.completeness))
+
     def followed(held: System, at: Array, tell: Progress | None) -> ComplexModes:
         return complex_modes(
             held, at, max_frequency_hz=max_frequency_hz, damped=damped, vectors=vectors, residuals=residuals,
@@ -66,13 +70,13 @@ def modes_of_band(
         return checked_modes(held, found, max_frequency_hz, own=own, options=options)
 
     if len(values) < 2 or not (np.all(np.isfinite(values)) and np.all(values >= 0)):
-        return checked(system, followed(system, values, progress))
+        return said(checked(system, followed(system, values, progress)))
     over = stretches(system, float(values.min()), float(values.max()), at=values, solver=options.solver)
     parts = _parts(over, values)
     if len(parts) == 1 and not parts[0][0].reason:
         held = parts[0][0].of(system)
-        return checked(held, followed(held, values, progress))
-    return _modes_of_parts(system, values, parts, over, followed, checked, progress)
+        return said(checked(held, followed(held, values, progress)))
+    return said(_modes_of_parts(system, values, parts, over, followed, checked, progress))
 
 
 def _parts(over: tuple[Stretch, ...], values: Array) -> list[tuple[Stretch, IntArray]]:
@@ -184,7 +188,12 @@ def onsets_of_band(
     `checked_onsets` out, and nothing else. They are kept with the system. Raises as `onsets`."""
     chosen, (low, high) = options or Options(), (float(v) for v in friction_range)
     asked = ("onsets", low, high, max_frequency_hz, damped, chosen, check)
-    return system.once(asked, lambda: _solved_onsets(system, (low, high), max_frequency_hz, damped, chosen, check))
+
+    def solved() -> Onsets:
+        found = _solved_onsets(system, (low, high), max_frequency_hz, damped, chosen, check)
+        return replace(found, completeness=of_alike(found.completeness, system.repeating))
+
+    return system.once(asked, solved)
 
 
 def _shapes_at(

@@ -12,6 +12,7 @@ from ..asking import NUMBER
 from ..case import Case, load
 from ..case.bodies import MassBody, SolidBody
 from ..case.points import BoundaryRef
+from ..case.repeating import repeating
 from ..case.schema import Load, SteadyStep
 from ..contact.interface import Rows
 from ..errors import CaseError, kind_of
@@ -107,6 +108,7 @@ def build_system(
         load_steps=_load_steps(case, motion),
         contact_cubic={name: contact.cubic for name, contact in case.contacts.items() if contact.cubic},
         tie_words=() if tied is None else tied.words,
+        repeating=repeating(case.ties),
     ).keeping_frictionless()
 
 

@@ -108,10 +108,10 @@ class System(Shown):
     has any. contact_cubic: contact → factor of the cube of the approach in its normal force, per area [N/m⁵], of a
     point [N/m³]. not_symmetric_definite: why its matrices, imported ones, are not all symmetric with a positive
     definite mass, as all others are; "" where they are. holders: contact → paths of the supports and ties at its nodes.
-    tie_words: warnings about ties. load_steps: the way to the static equilibrium, with stick and partial slip; empty
-    where all contacts slide as the motions have them. placed: whether it is what `in_place` has made of another.
-    touching_at: the μ of the steady sliding whose nodes touch in its modes, whichever μ these are of; None where
-    whoever asks for modes says.
+    tie_words: warnings about ties. repeating: paths of the ties by which bodies repeat. load_steps: the way to the
+    static equilibrium, with stick and partial slip; empty where all contacts slide as the motions have them. placed:
+    whether it is what `in_place` has made of another. touching_at: the μ of the steady sliding whose nodes touch in its
+    modes, whichever μ these are of; None where whoever asks for modes says.
 
     Frozen, so that every question has one answer: `once` keeps what is asked for again and again, in ``answers``;
     ``of_matrices`` has what follows from mass, damping and stiffness alone, which systems with other contacts share.
@@ -138,6 +138,7 @@ class System(Shown):
     load_steps: tuple[LoadStep, ...] = ()
     placed: bool = False
     tie_words: tuple[str, ...] = ()
+    repeating: tuple[str, ...] = ()
     contact_cubic: Mapping[str, float] = field(default_factory=dict)
     touching_at: float | None = None
     of_matrices: AnswerCache = field(default_factory=AnswerCache, repr=False, compare=False)
