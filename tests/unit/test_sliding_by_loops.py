@@ -863,7 +863,8 @@ def test_stretches_in_words() -> None:
     assert words((one,)) == words((Stretch(0.0, 0.9, None),)) == elsewhere((one,)) == ()
     assert words((one, two)) == (
         "Of the 8 contact nodes other ones touch in steady sliding as friction grows: 6 between μ = 0 and 0.31, 5 between "
-        "μ = 0.31 and 0.5. Each μ is solved with those of its stretch.",
+        "μ = 0.31 and 0.5. Each μ is solved with those of its stretch; modes keep their numbers from one to the next, "
+        "where a single μ numbers its own.",
     )
     assert words((one, none)) == ("Between μ = 0.5 and 0.9 nothing was solved: it tips over.",)
     assert words((none,)) == ("Between μ = 0.5 and 0.9 nothing was solved: it tips over.",)

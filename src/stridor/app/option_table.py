@@ -97,7 +97,7 @@ Branch = Annotated[
     list[int] | None,
     _option(
         "--branch",
-        "Mode by its number in `modes`. Repeatable [default: the unstable ones].",
+        "Mode by its number in `modes` at that μ alone. Repeatable [default: the unstable ones].",
         metavar="NUMBER",
         on="shapes sensitivities countermeasures",
         lacks="steady=static modes=--band onsets=--band simulate=time cycles=all "

@@ -175,7 +175,8 @@ def stretch_words(found: tuple[Stretch, ...], name: str = "μ") -> tuple[str, ..
         parts = [f"{_counts(s, alike)} between {name} = {s.low:.6g} and {s.high:.6g}" for s in solid]
         told.append(
             f"Of the {solid[0].nodes} contact nodes other ones {verb} in steady sliding {as_grows}: "
-            f"{', '.join(parts)}. Each {one} is solved with those of its stretch."
+            f"{', '.join(parts)}. Each {one} is solved with those of its stretch; modes keep their numbers from one to "
+            f"the next, where a single {one} numbers its own."
         )
     if several := sorted({mu for s in solid for mu in s.several}):
         where = ", ".join(f"{mu:.4g}" for mu in several)
