@@ -11,6 +11,7 @@ from ..errors import CaseError
 from ..system import System
 from ..threads import one_thread
 from ..typing import Array
+from .krylov import Carried
 from .options import Options
 from .painleve import refuse_undetermined
 from .results import UNSTABLE_RELATIVE, ComplexModes, Progress, grows
@@ -35,6 +36,7 @@ def complex_modes(
     source: str | None = None,
     progress: Progress | None = None,
     numbered_at: float = 0.0,
+    carried: Carried | None = None,
 ) -> ComplexModes:
     """Modes at the friction coefficients ``mu``, branches followed from μ = 0.
 
@@ -46,6 +48,7 @@ def complex_modes(
     or "full" (any matrices); None takes what suits the system, and the next where that turns out not to.
     friction_damping (across the direction of sliding), prestress and the direct solver matter on sparse matrices only.
     numbered_at: a μ up to the least of them, from which "krylov" follows instead where numbers do not matter.
+    carried: what a stretch of μ hands on to the next.
     progress is called with the number of μ done and of all; on
     KeyboardInterrupt what is done is returned, ``planned`` tells of how many. Raises AnalysisError where contacts do
     not slide, have no equilibrium, branches cannot be told apart, or the source named does not take the system;
@@ -59,6 +62,6 @@ def complex_modes(
     refuse_undetermined(system, highest, options, touching_at=highest if len(values) == 1 else None)
     asked = ModesAsked(
         max_frequency_hz, damped=damped, options=options, count=count, vectors=vectors, residuals=residuals,
-        progress=progress, numbered_at=numbered_at,
+        progress=progress, numbered_at=numbered_at, carried=carried,
     )  # fmt: skip
     return answered(system, asked, lambda source, a: source.modes(system, values, a), without_following=True)

@@ -57,10 +57,12 @@ def modes_of_band(
     def said(found: ComplexModes) -> ComplexModes:
         return replace(found, completeness=tuple(of_alike(each, system.repeating) for each in found.completeness))
 
-    def followed(held: System, at: Array, tell: Progress | None) -> ComplexModes:
+    def followed(
+        held: System, at: Array, tell: Progress | None, start: float = numbered_at, carried: Carried | None = None
+    ) -> ComplexModes:
         return complex_modes(
             held, at, max_frequency_hz=max_frequency_hz, damped=damped, vectors=vectors, residuals=residuals,
-            progress=tell, numbered_at=numbered_at, **asdict(options),
+            progress=tell, numbered_at=start, carried=carried, **asdict(options),
         )  # fmt: skip
 
     def checked(held: System, found: ComplexModes) -> ComplexModes:
@@ -91,7 +93,7 @@ def _modes_of_parts(
     values: Array,
     parts: list[tuple[Stretch, IntArray]],
     over: tuple[Stretch, ...],
-    followed: Callable[[System, Array, Progress | None], ComplexModes],
+    followed: Callable[..., ComplexModes],
     checked: Callable[[System, ComplexModes], ComplexModes],
     progress: Progress | None,
 ) -> ComplexModes:
@@ -103,18 +105,21 @@ def _modes_of_parts(
     borders: list[TouchingChange] = []
     order: list[int] = []
     left: tuple[IntArray, ComplexArray] | None = None
-    stopped = False
+    stopped, carried = False, Carried()
     for k, (stretch, indices) in enumerate(solid):
         # Both sides of a border are solved at its μ as well, so that branches are known again beyond it.
         ends = [s.low for s, _ in (solid[k : k + 1] if k else []) + solid[k + 1 : k + 2]]
         held, done = stretch.of(system), len(order)
+        carried.inner = k > 0, k < len(solid) - 1
 
         def tell(at: int, of: int, done: int = done) -> None:
             if progress is not None:
                 progress(min(done + at, len(values)), len(values))
 
         try:
-            whole = followed(held, np.append(values[indices], ends), tell)
+            # Branches have the names that they had before a border, and need not be followed up to it again.
+            at = np.append(values[indices], ends)
+            whole = followed(held, at, tell, stretch.low, carried) if k else followed(held, at, tell, carried=carried)
         except KeyboardInterrupt:
             if not found:
                 raise

@@ -127,6 +127,7 @@ class KrylovSource:
             return krylov_modes(
                 system, values, count=asked.count or 20, max_frequency_hz=asked.max_frequency_hz, damped=asked.damped,
                 vectors=asked.vectors, options=asked.options, progress=asked.progress, numbered_at=asked.numbered_at,
+                carried=asked.carried,
             )  # fmt: skip
         except NotPositive as error:
             raise Unfit(str(error), asked.max_frequency_hz) from error

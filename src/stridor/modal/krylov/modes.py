@@ -19,14 +19,16 @@ from ..quadratic.inverse_iteration import solved_beside
 from ..quadratic.reach import searched
 from ..results import ComplexModes, Progress, at_each, off_rounding, require_memory
 from ..tolerances import BELIEVED, SPLIT_RELATIVE
+from .carried import Carried
 from .follow import Follower
 from .problem import problem_of
 from .reduced import Reduced
-from .refine import MARGIN, NAMES, Band, converge_at, converge_over, left_vectors, projected
+from .refine import GUARD, MARGIN, NAMES, Band, converge_at, converge_over, left_vectors, projected
 
 _log = logging.getLogger("stridor")
 
-SAMPLES = 7
+SAMPLES = 7  # from no friction on
+FEWEST = 3
 SAME = 1e-6  # of an eigenvalue: a left vector solved for belongs to it
 
 
@@ -42,14 +44,16 @@ def krylov_modes(
     options: Options | None = None,
     progress: Progress | None = None,
     numbered_at: float = 0.0,
+    carried: Carried | None = None,
 ) -> ComplexModes:
     """Modes at the friction coefficients ``mu``, branches followed from ``numbered_at``, as `complex_modes` gives them.
 
     count: how many branches, lowest frequencies at μ = 0 first; max_frequency_hz instead takes all that start below it,
     and those that start a little above and come below it at one of these μ. vectors keeps left and right ones, "right"
-    those alone, n numbers for each. progress and KeyboardInterrupt are as in `complex_modes`. Raises CaseError for
-    friction coefficients or counts that are none, AnalysisError where contacts do not slide, have no equilibrium, or
-    the modes do not settle.
+    those alone, n numbers for each. carried: what the basis of the stretch of μ before hands on, and this one to the
+    next, where no left vectors are asked for. progress and KeyboardInterrupt are as in `complex_modes`. Raises
+    CaseError for friction coefficients or counts that are none, AnalysisError where contacts do not slide, have no
+    equilibrium, or the modes do not settle.
     """
     values = checked_friction(mu)
     if count < 1:
@@ -66,11 +70,17 @@ def krylov_modes(
 
     def solved(*, left: bool) -> ComplexModes:
         """With left vectors of the basis, or else each solved for by itself."""
-        reduced = projected(problem, band, top)
-        converge_over(reduced, numbered_at + samples(top - numbered_at), between=NAMES, left=left)
+        handed = None if left else carried
+        reduced = projected(problem, band, top, handed)
+        count = SAMPLES if top == 0.0 else max(FEWEST, round(SAMPLES * (1.0 - numbered_at / top)))
+        inner = (False, False) if handed is None else handed.inner
+        frictions = numbered_at + samples(top - numbered_at, count)
+        converge_over(reduced, frictions, between=NAMES, left=left, inner=inner)
         done, _, planned = at_each(
             values, lambda at: converge_at(reduced, [at], tolerance=BELIEVED, left=left), progress
         )
+        if handed is not None:
+            handed.take(reduced, GUARD)
         found = _followed(reduced, done, band, damped=damped, vectors=vectors, start=numbered_at, of_basis=left)
         planned = found.planned if planned is None else planned
         return replace(found, max_frequency_hz=max_frequency_hz, planned=planned)
