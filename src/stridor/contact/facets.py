@@ -13,7 +13,7 @@ on flat surfaces. Linear facets lie below a curved surface by up to `chord_heigh
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -25,10 +25,12 @@ from ..errors import CaseError
 from ..mesh.facets import reference_nodes, shape_functions
 from ..mesh.model import Blocks
 from ..typing import Array, BoolArray, IntArray
+from .creases import Edges, corners_of, creases, edges_of
 from .facet_search import EDGE_TOLERANCE, MONOMIALS, edge_coordinates, locate_all, nearest_edges, shape_of
 from .master import Location
 
 CANDIDATES = 4
+CORNER_DEG = 40.0  # what turns by more is an edge, whatever is around
 NODE = 1e-9  # weights below are none: a point within rounding of a node is that node, as in `facet_search`
 STRAIGHT = 1e-12  # of an edge's length: what it may be bent by and be straight
 SPLITS = {
@@ -47,14 +49,15 @@ class FacetSurface:
     nodes (k,): the mesh's own numbers of the surface's nodes, the order in which displacements and rows are expected.
     positions (k, 3) [m] undisplaced. facets (f, 4) of the surface's numbering, −1 in the last place of a triangle.
     neighbours (f, 4): the facet over the edge that begins at each corner, −1 at the surface's own edge. sharp (f, 4):
-    edges over which the normal turns by more than the corner angle. groups (f, 4): the number of the smoothed normal
+    edges of the body, over which normals are not averaged. groups (f, 4): the number of the smoothed normal
     that a corner takes part in. elements (f, 9): nodes of the mesh's own, maybe quadratic, facet that each was split
     from, 0 in unused places; tangents (patterns, 4, 2, 9): what their positions contribute to the two tangents at
     each corner, by the pattern (f,) of the split; kinds and splits: for each pattern the kind of that facet and which
     of its nodes are the corners. polynomials (patterns, 11, 9): what nodes of a quadratic facet contribute to the
     coefficients of its coordinates on a part, in `MONOMIALS` of those of the part; curved (patterns,): whether facets
     are quadratic; element_groups (f, 9): the smoothed normals at their nodes. blocks: the mesh's own facets by kind in
-    the surface's numbering.
+    the surface's numbering. doubtful (q, 4): middle [m] and angle [rad] of edges that may be as well what they are not
+    taken as (`creases`).
     """
 
     nodes: IntArray
@@ -72,12 +75,14 @@ class FacetSurface:
     curved: BoolArray
     element_groups: IntArray
     blocks: Blocks
+    doubtful: Array
 
     @classmethod
-    def from_facets(cls, points: Array, facets: Blocks, *, where: str, corner_deg: float = 40.0) -> FacetSurface:
+    def from_facets(cls, points: Array, facets: Blocks, *, where: str, corner_deg: float = CORNER_DEG) -> FacetSurface:
         """The surface that triangles and quadrilaterals of a mesh with points (·, 3) make up.
 
-        corner_deg: over edges where neighbours turn by more, normals are not averaged. Raises CaseError naming
+        corner_deg: over edges where neighbours turn by more, and over those that stand alone between flats (`creases`),
+        normals are not averaged. Raises CaseError naming
         ``where`` for no facets, facets without area and edges that more than two facets share or that two facets
         pass in the same direction (they disagree about the outside).
         """
@@ -98,23 +103,18 @@ class FacetSurface:
             at = ", ".join(f"{x:.6g}" for x in positions[local[int(np.argmin(normals.any(axis=1))), :3]].mean(axis=0))
             raise CaseError(where, None, f"the facet at ({at}) m has no area; merge its nodes or leave it out")
         neighbours, over_edge = _neighbours(local, positions, where)
-        turn = np.einsum("fd,fed->fe", normals, normals[neighbours])
-        sharp = (neighbours >= 0) & (turn < np.cos(np.radians(corner_deg)))
-        whole_of = np.concatenate([[0], np.cumsum([len(block) for _, block in blocks])])
-        owner = np.concatenate(
-            [first + np.tile(np.arange(len(block)), len(_splits(kind)))
-             for first, (kind, block) in zip(whole_of, blocks, strict=False)]
-        )  # fmt: skip
-        sharp &= owner[:, None] != owner[neighbours]  # no facet has an edge amid itself, however curved
-        groups = _groups(local, neighbours, over_edge, sharp)
         kinds, parts = tuple(kind for kind, _, _ in splits), tuple(tuple(split) for _, _, split in splits)
         own = {kind: np.searchsorted(nodes, block).astype(np.int64) for kind, block in blocks}
+        edges = edges_of(positions, own)
+        found = creases(edges, corners_of(own), np.radians(corner_deg))
+        sharp = (neighbours >= 0) & _edges_of_parts(edges, found.edge, own, kinds, parts)
+        groups = _groups(local, neighbours, over_edge, sharp)
         curved = np.array([len(_splits(kind)) > 1 for kind in kinds])
         polynomials = np.stack([_polynomial_of(kind, split) for kind, split in zip(kinds, parts, strict=True)])
         at_nodes = _element_groups(groups, kinds, parts, pattern)
         return cls(
             nodes, positions, local, neighbours, sharp, groups, elements, pattern, tangents, kinds, parts, polynomials,
-            curved, at_nodes, own,
+            curved, at_nodes, own, np.column_stack([edges.middle, edges.turn])[found.doubtful],
         )  # fmt: skip
 
     @property
@@ -319,6 +319,45 @@ class FacetSurface:
             bend[mine[np.linalg.norm(bend[mine], axis=1) < STRAIGHT * size]] = 0.0
         return bend
 
+    def at_corners(self, location: Location, slaves: Array, slave_normals: Array) -> Location:
+        """Places of undisplaced slaves (m, 3) [m] where those that lie on an outward edge look the way their own
+        normals (m, 3) say, as far as the normals of both sides of the edge enclose that.
+
+        Which of its sides is nearer there rounding decides. Slaves without a normal keep that side's. Where edges meet,
+        that one counts which lets a slave look most its own way.
+        """
+        if not self.sharp.any():
+            return location
+        size = np.linalg.norm(np.ptp(self.positions[self.facets[:, :3]], axis=1), axis=1)
+        facet, _, _, distance = self._beside(slaves, self.positions, [self.sharp])
+        on = (distance <= EDGE_TOLERANCE * size[facet]) & np.any(slave_normals, axis=1)
+        which = np.flatnonzero(on)
+        if not len(which):
+            return location
+        facet, edge = np.nonzero(self.sharp & (np.arange(len(self.facets))[:, None] < self.neighbours))
+        begin, end = self.facets[facet, edge], self.facets[facet, _following(self.facets)[facet, edge]]
+        bends = self._edge_bends(self.positions, facet, edge)
+        smoothed = self._normals(self.positions)
+        normal = location.normal.copy()
+        for slave in which.tolist():
+            place, own = slaves[slave], -slave_normals[slave]
+            best = -np.inf
+            close = np.linalg.norm(0.5 * (self.positions[begin] + self.positions[end]) - place, axis=1) <= size[facet]
+            for k in np.flatnonzero(close).tolist():
+                ends = self.positions[begin[k : k + 1]], self.positions[end[k : k + 1]]
+                _, along, far = nearest_edges(place[None], *ends, bends[k : k + 1])
+                if far[0] > EDGE_TOLERANCE * size[facet[k]]:
+                    continue
+                both = np.zeros((2, 3))
+                for i, side in enumerate((facet[k], self.neighbours[facet[k], edge[k]])):
+                    for node, part in ((begin[k], 1.0 - along[0]), (end[k], along[0])):
+                        both[i] += part * smoothed[self.groups[side, int(np.argmax(self.facets[side] == node))]]
+                both /= np.linalg.norm(both, axis=1, keepdims=True)
+                looks = _between(both[0], both[1], (ends[1] - ends[0])[0], own)
+                if looks is not None and looks @ own > best:
+                    best, normal[slave] = looks @ own, looks
+        return replace(location, normal=normal, gap=np.sum(normal * (slaves - location.point), axis=1))
+
     def _over_rim(self, facet: IntArray, offset: Array, normal: Array, normals: Array, current: Array) -> BoolArray:
         """Whether slaves at an offset (q, 3) from the surface's own edge stand over that edge as far as can be told.
 
@@ -349,6 +388,18 @@ class FacetSurface:
         return np.where(apart[:, None], scaled, mean)
 
 
+def _between(one: Array, two: Array, along: Array, own: Array) -> Array | None:
+    """The direction (3,) nearest to another among those that the normals of both sides of an edge enclose; None into a
+    notch. along (3,): with the first side on its left."""
+    along = along / np.linalg.norm(along)
+    across = np.cross(along, one)
+    turn, angle = (np.arctan2(v @ across, v @ one) for v in (two, own))
+    if turn <= 0.0:
+        return None
+    angle = np.clip(angle, 0.0, turn)
+    return np.cos(angle) * one + np.sin(angle) * across
+
+
 def _splits(kind: str) -> list[list[int]]:
     """Corners of the linear facets that a facet of a kind is split into. Raises ValueError for other kinds."""
     if kind not in SPLITS:
@@ -373,6 +424,27 @@ def _corner_tangents(kind: str, split: list[int]) -> Array:
     for j, towards in enumerate((np.roll(corners, -1, axis=0), np.roll(corners, 1, axis=0))):
         found[: len(corners), j, : slopes.shape[2]] = np.einsum("eqr,qe->qr", slopes, towards - corners)
     return found
+
+
+def _edges_of_parts(
+    edges: Edges, chosen: BoolArray, blocks: Blocks, kinds: tuple[str, ...], splits: tuple[tuple[int, ...], ...]
+) -> BoolArray:
+    """Which edges (f, 4) of the parts of the mesh's own facets lie on chosen (e,) edges between these."""
+    whole = np.zeros((sum(len(block) for block in blocks.values()), 4), dtype=bool)
+    whole[edges.facets[chosen], edges.places[chosen]] = True
+    starts = dict(zip(blocks, np.cumsum([0, *(len(block) for block in blocks.values())]), strict=False))
+    found: list[BoolArray] = []
+    for kind, split in zip(kinds, splits, strict=True):
+        count = 3 if kind.startswith("triangle") else 4
+        own = [c for c in split if c >= 0]
+        mine = whole[starts[kind] : starts[kind] + len(blocks[kind])]
+        of_part = np.zeros((len(mine), 4), dtype=bool)
+        for place, pair in enumerate(zip(own, own[1:] + own[:1], strict=True)):
+            for edge in range(count):
+                if set(pair) <= {edge, (edge + 1) % count, count + edge}:
+                    of_part[:, place] = mine[:, edge]
+        found.append(of_part)
+    return np.concatenate(found)
 
 
 def _element_groups(

@@ -13,6 +13,7 @@ from ..case.bodies import BeamBody, MassBody, MatrixBody, ObstacleBody, SolidBod
 from ..case.matrix_checks import MU
 from ..case.schema import Contact, Friction, Load, Spring, TabulatedTable, Tie
 from ..case.usual import USUAL
+from ..contact.facets import CORNER_DEG, FacetSurface
 from ..errors import AnalysisError
 from ..matrices.report import LOST, NO_FRICTION
 from ..mesh.hanging import hanging
@@ -400,7 +401,36 @@ def mesh_warnings(case: Case, system: System) -> list[str]:
             off = float(np.min(np.linalg.norm(solid.points - np.array(position), axis=1)))
             if off > 0.5 * largest:
                 found.append(f"{where}.points.{point}: the nearest node is {off:.3g} m away")
-    return found + _surface_warnings(case, system)
+    return found + _surface_warnings(case, system) + edge_warnings(system)
+
+
+def edge_warnings(system: System) -> list[str]:
+    """Edges of masters in space, where slaves are, of which facets do not tell whether they are of a curve."""
+    found: list[str] = []
+    for surface in system.surfaces:
+        if not isinstance(surface.master, FacetSurface) or not len(surface.master.doubtful):
+            continue
+        edges, places = surface.master.doubtful, surface.location.point
+        beside = 0.1 * np.linalg.norm(np.ptp(places, axis=0))
+        near = (edges[:, :3] >= places.min(axis=0) - beside) & (edges[:, :3] <= places.max(axis=0) + beside)
+        for sharp in (False, True):
+            some = edges[near.all(axis=1) & ((np.abs(edges[:, 3]) > np.radians(CORNER_DEG)) == sharp)]
+            if not len(some):
+                continue
+            first = ", ".join(f"{x:.6g}" for x in some[0, :3] + 0.0)
+            angle = float(np.degrees(np.abs(some[:, 3]).max()))
+            how, what = (
+                ("one after the other", "it is taken as edges; divide it into more facets if it is a curve")
+                if sharp
+                else (
+                    "amid what is flat",
+                    "a chamfer of one row of facets or a curve, it is taken as a curve; mesh it with two rows if it "
+                    "has edges there",
+                )
+            )
+            lead = f"contact {surface.name}: edges of the master turn by {angle:.3g}° {how}"
+            found.append(f"{lead}, the first at ({first}) m: {what}")
+    return found
 
 
 def _surface_warnings(case: Case, system: System) -> list[str]:
