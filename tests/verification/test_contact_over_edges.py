@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ import stridor as st
 from stridor.contact.pairing import repair
 from stridor.mesh.facets import nodal_areas
 from stridor.sliding import steady_sliding
+from stridor.study.description import piece_warnings
 from stridor.system import build_system
 
 pytestmark = pytest.mark.verification
@@ -276,3 +278,20 @@ def test_whichever_body_is_the_slave_modes_come_together_with_finer_meshes(fines
     assert apart[0] < 0.13
     assert apart[1] < 0.05
     assert len(apart) < 3 or apart[2] < 0.025
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.02, 0.1])
+def test_facets_over_pieces_of_two_heights_are_said(gap):
+    """Two pads below one slave: their areas are right however narrow what is between, and flush ones are none to tell."""
+    slave = sheet("quad", 4, 4, turned=True)
+    for step, said in ((0.0, 0), (1e-6, 1), (1e-3, 1)):
+        one, other = sheet("quad", 3, 4, seed=1), sheet("quad", 2, 3, seed=2)
+        left = one[0] * [0.45, 1, 1]
+        right = other[0] * [0.55 - gap, 1, 1] + [0.45 + gap, 0, step]
+        blocks = {"quad": np.concatenate([one[1]["quad"], other[1]["quad"] + len(left)])}
+        contact = contact_of((slave[0] + [0, 0, 0.01], slave[1]), (np.concatenate([left, right]), blocks))
+        assert contact.nodes.area.sum() == pytest.approx(1.0 - gap, abs=1e-12)
+        found = piece_warnings(SimpleNamespace(surfaces=[contact]))
+        assert len(found) == said
+        for words in found:
+            assert f"one up to {step:.3g} m higher than the other: each node measures its gap to one of them" in words
