@@ -295,3 +295,23 @@ def test_facets_over_pieces_of_two_heights_are_said(gap):
         assert len(found) == said
         for words in found:
             assert f"one up to {step:.3g} m higher than the other: each node measures its gap to one of them" in words
+
+
+@pytest.mark.parametrize("angle_deg", [10.0, 20.0, 38.0])
+def test_a_flat_on_a_chamfered_pad_touches_along_its_flat(angle_deg):
+    """Nodes on the edge of the flat look straight up, as all of the flat, and those over the chamfer straight at it."""
+    slope = math.tan(math.radians(angle_deg))
+    slave, (flat, blocks) = sheet("quad", 6, 2, turned=True), sheet("quad", 6, 2)
+    for points in (slave[0], flat):  # six even columns
+        points[:, 0] = np.round(6 * points[:, 0]) / 6
+    flat = flat - np.maximum(flat[:, :1] - 4 / 6, 0.0) * [0.0, 0.0, slope]
+    turn = rotation()
+    turn = turn * np.sign(np.linalg.det(turn))
+    contact = contact_of((slave[0] @ turn.T, slave[1]), (flat @ turn.T, blocks))
+    place, normal = contact.slave_position @ turn, contact.location.normal @ turn
+    off = place[:, 0] - 4 / 6
+    assert (np.abs(off) < 1e-9).sum() == 3
+    np.testing.assert_allclose(normal[off < 1e-9], np.tile([0, 0, 1.0], ((off < 1e-9).sum(), 1)), atol=1e-9)
+    over = (off > 1e-9) & contact.location.inside
+    assert over.any()
+    np.testing.assert_allclose(contact.nodes.gap, np.maximum(off, 0.0) * slope * math.cos(math.radians(angle_deg)), atol=1e-12)
