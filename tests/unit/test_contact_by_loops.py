@@ -309,15 +309,22 @@ def test_weights_of_corners_and_places_on_edges() -> None:
 def test_nearest_edges_are_found_by_trying_all_their_points() -> None:
     rng = np.random.default_rng(8)
     begin, end, slaves = rng.normal(size=(3, 7, 3))
-    which, along, distance = nearest_edges(slaves, begin, end)
+    _, straight, _ = nearest_edges(slaves, begin, end, np.zeros((7, 3)))
+    assert {0.0, 1.0} & set(straight.tolist())  # off an end as well
+    for bend in (np.zeros((7, 3)), 0.5 * rng.normal(size=(7, 3))):
+        _edges_are_nearest(begin, end, bend, slaves)
+
+
+def _edges_are_nearest(begin, end, bend, slaves) -> None:
+    which, along, distance = nearest_edges(slaves, begin, end, bend)
     t = np.linspace(0, 1, 20001)
+    curves = begin[:, None] + t[:, None] * (end - begin)[:, None] + (t * (1 - t))[:, None] * bend[:, None]
     for i in range(7):
-        away = np.linalg.norm(slaves[i] - begin[:, None] - t[:, None] * (end - begin)[:, None], axis=2)
+        away = np.linalg.norm(slaves[i] - curves, axis=2)
         edge, local = np.unravel_index(np.argmin(away), away.shape)
         assert which[i] == edge
         assert along[i] == pytest.approx(t[local], abs=1e-4)
         assert distance[i] == pytest.approx(away.min(), rel=1e-6)
-    assert {0.0, 1.0} & set(along.tolist())  # off an end as well
 
 
 @pytest.mark.parametrize("kind", KINDS)

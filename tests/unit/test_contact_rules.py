@@ -84,7 +84,8 @@ def on_facet(corners, normals, slave):
     if len(corners) == 3:
         facet[3] = -1
     place = np.zeros(3)
-    found = place_on_facet(np.array(slave, dtype=float), corners, facet, normals, place, np.zeros((3, 4)), np.zeros((6, 3)))
+    space = np.zeros((3, 4)), np.zeros((6, 3))
+    found = place_on_facet(np.array(slave, dtype=float), corners, facet, normals, False, np.zeros((11, 6)), place, *space)
     return bool(found), place
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ import stridor as st
 from stridor.contact.pairing import repair
 from stridor.mesh.facets import nodal_areas
 from stridor.sliding import steady_sliding
+from stridor.study.description import piece_warnings
 from stridor.system import build_system
 
 pytestmark = pytest.mark.verification
@@ -276,3 +278,40 @@ def test_whichever_body_is_the_slave_modes_come_together_with_finer_meshes(fines
     assert apart[0] < 0.13
     assert apart[1] < 0.05
     assert len(apart) < 3 or apart[2] < 0.025
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.02, 0.1])
+def test_facets_over_pieces_of_two_heights_are_said(gap):
+    """Two pads below one slave: their areas are right however narrow what is between, and flush ones are none to tell."""
+    slave = sheet("quad", 4, 4, turned=True)
+    for step, said in ((0.0, 0), (1e-6, 1), (1e-3, 1)):
+        one, other = sheet("quad", 3, 4, seed=1), sheet("quad", 2, 3, seed=2)
+        left = one[0] * [0.45, 1, 1]
+        right = other[0] * [0.55 - gap, 1, 1] + [0.45 + gap, 0, step]
+        blocks = {"quad": np.concatenate([one[1]["quad"], other[1]["quad"] + len(left)])}
+        contact = contact_of((slave[0] + [0, 0, 0.01], slave[1]), (np.concatenate([left, right]), blocks))
+        assert contact.nodes.area.sum() == pytest.approx(1.0 - gap, abs=1e-12)
+        found = piece_warnings(SimpleNamespace(surfaces=[contact]))
+        assert len(found) == said
+        for words in found:
+            assert f"one up to {step:.3g} m higher than the other: each node measures its gap to one of them" in words
+
+
+@pytest.mark.parametrize("angle_deg", [10.0, 20.0, 38.0])
+def test_a_flat_on_a_chamfered_pad_touches_along_its_flat(angle_deg):
+    """Nodes on the edge of the flat look straight up, as all of the flat, and those over the chamfer straight at it."""
+    slope = math.tan(math.radians(angle_deg))
+    slave, (flat, blocks) = sheet("quad", 6, 2, turned=True), sheet("quad", 6, 2)
+    for points in (slave[0], flat):  # six even columns
+        points[:, 0] = np.round(6 * points[:, 0]) / 6
+    flat = flat - np.maximum(flat[:, :1] - 4 / 6, 0.0) * [0.0, 0.0, slope]
+    turn = rotation()
+    turn = turn * np.sign(np.linalg.det(turn))
+    contact = contact_of((slave[0] @ turn.T, slave[1]), (flat @ turn.T, blocks))
+    place, normal = contact.slave_position @ turn, contact.location.normal @ turn
+    off = place[:, 0] - 4 / 6
+    assert (np.abs(off) < 1e-9).sum() == 3
+    np.testing.assert_allclose(normal[off < 1e-9], np.tile([0, 0, 1.0], ((off < 1e-9).sum(), 1)), atol=1e-9)
+    over = (off > 1e-9) & contact.location.inside
+    assert over.any()
+    np.testing.assert_allclose(contact.nodes.gap, np.maximum(off, 0.0) * slope * math.cos(math.radians(angle_deg)), atol=1e-12)

@@ -34,6 +34,7 @@ from stridor.mesh.model import FACET_KINDS
 pytestmark = pytest.mark.verification
 
 SPACE_KINDS = ("triangle", "triangle6", "quad", "quad8", "quad9")
+LINEAR, QUADRATIC = ("triangle", "quad"), ("triangle6", "quad8", "quad9")
 
 
 # -- meshes ------------------------------------------------------------------------------------------------------------
@@ -410,7 +411,28 @@ def test_nodes_edges_and_vertices_of_the_surface_are_inside(kind):
     assert surface.locate(edge).inside.tolist() == [True, False]
 
 
-@pytest.mark.parametrize("kind", SPACE_KINDS)
+@pytest.mark.parametrize("kind", QUADRATIC)
+def test_gap_of_a_cylinder_of_quadratic_faces_is_wrong_to_fourth_order_and_its_normal_exact(kind):
+    """As the faces interpolate the circle: R(1 − |Σ φ n|), of the order of the fourth power of their angle."""
+    errors = []
+    rng = np.random.default_rng(5)
+    angle, radius, z = rng.uniform(0, 7, 300), rng.uniform(0.9, 1.5, 300), rng.uniform(0, 1, 300)
+    radial = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    slaves = radius[:, None] * radial + z[:, None] * [0, 0, 1]
+    for around in (8, 16):
+        surface = FacetSurface.from_facets(*cylinder(kind, around, around // 4), where="w")
+        found = surface.locate(slaves)
+        assert found.inside.all()
+        errors.append([np.abs(found.gap - (radius - 1)).max(), np.abs(found.normal - radial).max()])
+        carried = np.einsum("mr,mrd->md", found.weights, surface.positions[found.nodes])
+        np.testing.assert_allclose(carried, found.point, atol=1e-15)
+    # Faces of 45°: parabolas are off the circle by 7.3e-4 of its radius at most, linear parts were by 2e-2 to 4e-2.
+    assert errors[0][0] < 7.3e-4
+    assert math.log2(errors[0][0] / errors[1][0]) == pytest.approx(4, abs=0.2)
+    assert errors[1][1] < 1e-14
+
+
+@pytest.mark.parametrize("kind", LINEAR)
 def test_gap_of_a_cylinder_is_wrong_by_the_chord_height_and_its_normal_exact(kind):
     errors = []
     rng = np.random.default_rng(5)
@@ -592,6 +614,29 @@ def round_pair(gap=0.02, around=24, kind="quad"):
     angle = rng.uniform(0, 6, 12)
     out = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     return contact((1 + gap) * out + rng.uniform(0.2, 0.8, (12, 1)) * [0, 0, 1], -out, surface)
+
+
+@pytest.mark.parametrize("kind", QUADRATIC)
+def test_nodes_over_quadratic_faces_follow_these_at_the_start_and_as_they_slide(kind):
+    """Rows applied to places give the gap: they know the very point of the face that the gap is measured to."""
+    pair = round_pair(0.02, 8, kind)
+    assert pair.nodes.gap == pytest.approx(np.full(12, 0.02), abs=7.3e-4)
+    places = np.concatenate([pair.slave_position.ravel(), pair.master.positions.ravel()])
+    np.testing.assert_allclose(pair.nodes.normal @ places, pair.nodes.gap, atol=1e-14)
+    turn = np.array([[np.cos(0.3), -np.sin(0.3), 0], [np.sin(0.3), np.cos(0.3), 0], [0, 0, 1]])
+    slid, left = repair(
+        pair, pair.slave_position @ (turn - np.eye(3)).T, pair.master.positions @ (turn - np.eye(3)).T
+    )  # fmt: skip
+    assert not len(left)
+    np.testing.assert_allclose(slid.location.gap, pair.nodes.gap, atol=1e-14)
+    np.testing.assert_allclose(slid.location.weights, pair.location.weights, atol=1e-9)
+    turns = np.linspace(0, 0.9, 12)  # over a face, and past its edges
+    gaps = [
+        repair(pair, np.column_stack([*(pair.slave_position[:, :2] @ [[c, s], [-s, c]]).T, pair.slave_position[:, 2]])
+               - pair.slave_position, np.zeros_like(pair.master.positions))[0].location.gap
+        for c, s in zip(np.cos(turns), np.sin(turns), strict=True)
+    ]  # fmt: skip
+    assert np.abs(np.array(gaps) - 0.02).max() < 7.3e-4
 
 
 @pytest.mark.parametrize("gap", [0.0, 0.2])
@@ -816,12 +861,22 @@ def test_places_on_any_bent_sheet_are_found_along_its_normals(seed, kind):
     points, facets = patch(kind, lambda u, v: np.column_stack([u, v, a * u * u + b * u * v]), 4, 3)
     surface = FacetSurface.from_facets(points, facets, where="w")
     normals = surface.corner_normals(surface.positions)
-    facet = rng.integers(0, len(surface.facets), 20)
-    weights = rng.dirichlet([1, 1, 1], 20)
-    corners = surface.facets[facet][:, :3]
-    three = surface.facets[facet, 3] < 0
-    place = np.einsum("mr,mrd->md", weights, surface.positions[corners])
-    normal = np.einsum("mr,mrd->md", weights, normals[facet][:, :3])
+    if kind in LINEAR:
+        facet = rng.integers(0, len(surface.facets), 20)
+        weights = rng.dirichlet([1, 1, 1], 20)
+        corners = surface.facets[facet][:, :3]
+        three = surface.facets[facet, 3] < 0
+        place = np.einsum("mr,mrd->md", weights, surface.positions[corners])
+        normal = np.einsum("mr,mrd->md", weights, normals[facet][:, :3])
+    else:
+        block = surface.blocks[kind]
+        nodes = block[rng.integers(0, len(block), 20)]
+        local = rng.dirichlet([1, 1, 1], 20)[:, :2]
+        weights, three = shape_functions(kind, local)[0], np.ones(20, dtype=bool)
+        at_nodes = np.zeros((surface.node_count, 3))
+        at_nodes[surface.facets[surface.facets >= 0]] = normals[surface.facets >= 0]
+        place = np.einsum("mr,mrd->md", weights, surface.positions[nodes])
+        normal = np.einsum("mr,mrd->md", weights, at_nodes[nodes])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     gap = rng.uniform(-0.1, 0.2, 20)
     found = surface.locate(place + gap[:, None] * normal)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_repeating_offsets import in_the_plane
+from test_repeating_offsets import in_space, in_the_plane
 from test_repeating_pieces import part, ring, turn, wheel_in
 
 import stridor as st
@@ -115,6 +115,7 @@ WHEEL = FACE + r"wheel\.outer, which repeats by 60° \(ties\.wheel\): at \(0\.0.
 REFUSED = {
     "a held quarter over the cut": (held(40.0, 90.0), WHEEL + "nothing is below it, and something below another"),
     "held pads by another angle": (held(0.0, 20.0, hub(45.0)), WHEEL + "nothing is below it, and something below"),
+    "a slit of 1° below facets of 10°": (held(44.2, 359.0), WHEEL + "nothing is below it, and something below"),
     "held pads to each second sector": (held(-15.0, 90.0, hub(120.0)), WHEEL + "something is below it, and nothing below"),
     "a bore with an axis of its own": (on_an_obstacle(BORE.replace("[0.0", "[1e-4")), WHEEL + "it is at another distance"),
     "a bore that slides straight": (
@@ -149,6 +150,22 @@ def test_a_master_that_sectors_of_the_slave_find_otherwise_is_refused(what: str)
     text, message = REFUSED[what]
     with pytest.raises(CaseError, match=message):
         st.build_system(loads(text))
+
+
+def in_space_on_a_ring(sweep: float) -> str:
+    """A sector of 60° of a ring, of facets of 20°, over a held ring of other facets, narrower than it."""
+    text = in_space(10.0, disc_repeats=False).replace('at = "disc.inner"', 'at = "disc.top"')
+    text = text.replace("divisions = [1, 3, 1]", "divisions = [2, 13, 1]", 1).replace("[1, 3, 1]", "[2, 3, 1]")
+    text = text.replace("inner_radius = 0.04, outer_radius = 0.09", "inner_radius = 0.055, outer_radius = 0.075")
+    text = text.replace("start_deg = 0.0, sweep_deg = 60.0", f"start_deg = 31.3, sweep_deg = {sweep}")
+    return text.replace("sliding = { spin = 20.0, axis = [0.0, 0.0, 1.0] }", "")
+
+
+def test_a_slit_in_space_is_seen_and_edges_of_chords_are_none() -> None:
+    with pytest.raises(CaseError, match="nothing is below it, and something below another sector"):
+        st.build_system(loads(in_space_on_a_ring(359.0)))
+    (surface,) = st.build_system(loads(in_space_on_a_ring(359.999))).surfaces
+    assert surface.area.sum() == pytest.approx(np.pi * (0.075**2 - 0.055**2) / 6.0, rel=0.05)  # of chords of 28°
 
 
 ACCEPTED = {

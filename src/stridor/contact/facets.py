@@ -1,18 +1,20 @@
-"""The boundary of a solid body as a master: linear facets with normals smoothed over the nodes.
+"""The boundary of a solid body as a master: facets with normals smoothed over the nodes.
 
-Quadratic facets are split into linear ones on their own nodes: triangle6 into four triangles, quad9 into four
-quadrilaterals, quad8 into a quadrilateral between its middle nodes and four triangles at its corners.
+Quadratic facets are walked over in parts between their own nodes: triangle6 as four triangles, quad9 as four
+quadrilaterals, quad8 as a quadrilateral between its middle nodes and four triangles at its corners. A part is as curved
+as its facet is: positions and normals are those of the facet's own shape functions, polynomials on the part.
 
 A slave x belongs to the master point X(ξ) with x = X(ξ) + g n(ξ), n the smoothed normal, continuous over edges and
 nodes unless they are sharp. The gap g is continuous; on a curved surface its derivative
     dg = n · (du_slave − Σ weights du_master) − n · X_ξ dξ − n · X_η dη
 keeps the last two terms, which the normal row leaves out: of first order in the angle between n and the facet, zero
-on flat surfaces. The facets lie below a curved surface by up to `chord_height`.
+on flat surfaces. Linear facets lie below a curved surface by up to `chord_height`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,10 +25,14 @@ from ..errors import CaseError
 from ..mesh.facets import reference_nodes, shape_functions
 from ..mesh.model import Blocks
 from ..typing import Array, BoolArray, IntArray
-from .facet_search import EDGE_TOLERANCE, edge_coordinates, locate_all, nearest_edges, shape_of
+from .creases import Edges, corners_of, creases, edges_of
+from .facet_search import EDGE_TOLERANCE, MONOMIALS, edge_coordinates, locate_all, nearest_edges, shape_of
 from .master import Location
 
 CANDIDATES = 4
+CORNER_DEG = 40.0  # what turns by more is an edge, whatever is around
+NODE = 1e-9  # weights below are none: a point within rounding of a node is that node, as in `facet_search`
+STRAIGHT = 1e-12  # of an edge's length: what it may be bent by and be straight
 SPLITS = {
     "triangle": [[0, 1, 2, -1]],
     "quad": [[0, 1, 2, 3]],
@@ -43,11 +49,15 @@ class FacetSurface:
     nodes (k,): the mesh's own numbers of the surface's nodes, the order in which displacements and rows are expected.
     positions (k, 3) [m] undisplaced. facets (f, 4) of the surface's numbering, −1 in the last place of a triangle.
     neighbours (f, 4): the facet over the edge that begins at each corner, −1 at the surface's own edge. sharp (f, 4):
-    edges over which the normal turns by more than the corner angle. groups (f, 4): the number of the smoothed normal
+    edges of the body, over which normals are not averaged. groups (f, 4): the number of the smoothed normal
     that a corner takes part in. elements (f, 9): nodes of the mesh's own, maybe quadratic, facet that each was split
     from, 0 in unused places; tangents (patterns, 4, 2, 9): what their positions contribute to the two tangents at
     each corner, by the pattern (f,) of the split; kinds and splits: for each pattern the kind of that facet and which
-    of its nodes are the corners. blocks: the mesh's own facets by kind in the surface's numbering.
+    of its nodes are the corners. polynomials (patterns, 11, 9): what nodes of a quadratic facet contribute to the
+    coefficients of its coordinates on a part, in `MONOMIALS` of those of the part; curved (patterns,): whether facets
+    are quadratic; element_groups (f, 9): the smoothed normals at their nodes. blocks: the mesh's own facets by kind in
+    the surface's numbering. doubtful (q, 4): middle [m] and angle [rad] of edges that may be as well what they are not
+    taken as (`creases`).
     """
 
     nodes: IntArray
@@ -61,13 +71,18 @@ class FacetSurface:
     tangents: Array
     kinds: tuple[str, ...]
     splits: tuple[tuple[int, ...], ...]
+    polynomials: Array
+    curved: BoolArray
+    element_groups: IntArray
     blocks: Blocks
+    doubtful: Array
 
     @classmethod
-    def from_facets(cls, points: Array, facets: Blocks, *, where: str, corner_deg: float = 40.0) -> FacetSurface:
+    def from_facets(cls, points: Array, facets: Blocks, *, where: str, corner_deg: float = CORNER_DEG) -> FacetSurface:
         """The surface that triangles and quadrilaterals of a mesh with points (·, 3) make up.
 
-        corner_deg: over edges where neighbours turn by more, normals are not averaged. Raises CaseError naming
+        corner_deg: over edges where neighbours turn by more, and over those that stand alone between flats (`creases`),
+        normals are not averaged. Raises CaseError naming
         ``where`` for no facets, facets without area and edges that more than two facets share or that two facets
         pass in the same direction (they disagree about the outside).
         """
@@ -88,13 +103,18 @@ class FacetSurface:
             at = ", ".join(f"{x:.6g}" for x in positions[local[int(np.argmin(normals.any(axis=1))), :3]].mean(axis=0))
             raise CaseError(where, None, f"the facet at ({at}) m has no area; merge its nodes or leave it out")
         neighbours, over_edge = _neighbours(local, positions, where)
-        turn = np.einsum("fd,fed->fe", normals, normals[neighbours])
-        sharp = (neighbours >= 0) & (turn < np.cos(np.radians(corner_deg)))
-        groups = _groups(local, neighbours, over_edge, sharp)
         kinds, parts = tuple(kind for kind, _, _ in splits), tuple(tuple(split) for _, _, split in splits)
         own = {kind: np.searchsorted(nodes, block).astype(np.int64) for kind, block in blocks}
+        edges = edges_of(positions, own)
+        found = creases(edges, corners_of(own), np.radians(corner_deg))
+        sharp = (neighbours >= 0) & _edges_of_parts(edges, found.edge, own, kinds, parts)
+        groups = _groups(local, neighbours, over_edge, sharp)
+        curved = np.array([len(_splits(kind)) > 1 for kind in kinds])
+        polynomials = np.stack([_polynomial_of(kind, split) for kind, split in zip(kinds, parts, strict=True)])
+        at_nodes = _element_groups(groups, kinds, parts, pattern)
         return cls(
-            nodes, positions, local, neighbours, sharp, groups, elements, pattern, tangents, kinds, parts, own
+            nodes, positions, local, neighbours, sharp, groups, elements, pattern, tangents, kinds, parts, polynomials,
+            curved, at_nodes, own, np.column_stack([edges.middle, edges.turn])[found.doubtful],
         )  # fmt: skip
 
     @property
@@ -109,7 +129,8 @@ class FacetSurface:
 
     @property
     def chord_height(self) -> float:
-        """Largest height [m] of the curved surface above the facets' edges, about h²/8R, as the normals tell it."""
+        """Largest height [m] of the curved surface above chords between its nodes, about h²/8R, as the normals tell
+        it."""
         normals = self.corner_normals(self.positions)
 
         def heights(begin: IntArray, end: IntArray) -> Array:
@@ -133,6 +154,10 @@ class FacetSurface:
         Those of the mesh's own facets, quadratic ones as curved as they are, are weighted as t1 × t2 / |t1|²|t2|² with
         their tangents along the edges (Max 1999), which makes the normals of a cylinder exact on uneven meshes too.
         """
+        return np.ascontiguousarray(np.where((self.facets >= 0)[..., None], self._normals(current)[self.groups], 0.0))
+
+    def _normals(self, current: Array) -> Array:
+        """The smoothed unit normals (·, 3), as `groups` numbers them."""
         valid = self.facets >= 0
         both = np.empty((2, *self.facets.shape, 3))
         for number, table in enumerate(self.tangents):
@@ -147,8 +172,7 @@ class FacetSurface:
             axis=1,
         )
         length = np.linalg.norm(total, axis=1, keepdims=True)
-        total = np.divide(total, length, out=np.zeros_like(total), where=length > 0)
-        return np.ascontiguousarray(np.where(valid[..., None], total[self.groups], 0.0))
+        return np.ascontiguousarray(np.divide(total, length, out=np.zeros_like(total), where=length > 0))
 
     def locate(self, slaves: Array, displacement: Array | None = None, *, guess: IntArray | None = None) -> Location:
         """Points of the displaced surface under slave positions (m, 3) [m], along its smoothed normals.
@@ -160,7 +184,7 @@ class FacetSurface:
         """
         current = self.positions if displacement is None else self.positions + displacement
         current, slaves = np.ascontiguousarray(current), np.ascontiguousarray(slaves, dtype=float)
-        normals = self.corner_normals(current)
+        normals = self._normals(current)
         if guess is not None:
             facet, local, inside = self._search(slaves, current, normals, np.asarray(guess, dtype=np.int64)[:, None])
             again = np.flatnonzero(~inside)
@@ -176,7 +200,9 @@ class FacetSurface:
         self, slaves: Array, current: Array, normals: Array, starts: IntArray
     ) -> tuple[IntArray, Array, BoolArray]:
         blocked = self.sharp | (self.neighbours < 0)
-        found = locate_all(slaves, current, self.facets, normals, self.neighbours, blocked, starts)
+        sheet = (current, self.facets, normals, self.groups, self.neighbours, blocked)
+        curved = (self.curved, self.pattern, self.polynomials, self.elements, self.element_groups)
+        found = locate_all(slaves, sheet, curved, starts)
         return found[0], found[1], found[2]
 
     def nearest_facets(self, slaves: Array, current: Array | None = None) -> IntArray:
@@ -205,7 +231,7 @@ class FacetSurface:
         self, slaves: Array, current: Array, normals: Array, facet: IntArray, local: Array, inside: BoolArray
     ) -> Location:
         """Points and normals at local coordinates (m, 2) on facets (m,); slaves not inside go to the nearest edge."""
-        point, normal, _ = self._at(current, normals, facet, local)
+        point, normal, _, _ = self._at(current, normals, facet, local)
         edge = np.full(len(slaves), -1)  # of the slaves that are nearest to an edge
         borders = (self.neighbours < 0) & (self.facets >= 0)
         endless = not (borders.any() or self.sharp.any())
@@ -220,7 +246,7 @@ class FacetSurface:
             swap = np.flatnonzero(near[3] < 0.9 * distance)
             facet[swap], local[swap], edge[swap] = near[0][swap], near[1][swap], near[2][swap]
         inside = (edge < 0) | self.sharp[facet, edge] | endless
-        point, normal, weights = self._at(current, normals, facet, local)
+        point, normal, nodes, weights = self._at(current, normals, facet, local)
         rim = np.flatnonzero(~inside)
         inside[rim] = self._over_rim(facet[rim], slaves[rim] - point[rim], normal[rim], normals, current)
         corner = np.flatnonzero((edge >= 0) & self.sharp[facet, edge])
@@ -228,15 +254,41 @@ class FacetSurface:
             across = self.neighbours[facet[corner], edge[corner]]
             normal[corner] = self._edge_normals(facet[corner], across, slaves[corner] - point[corner], current)
         gap = np.sum(normal * (slaves - point), axis=1)
-        nodes = np.where(weights == 0.0, 0, self.facets[facet])
         return Location(nodes, weights, point, normal, gap, facet, inside, local)
 
-    def _at(self, current: Array, normals: Array, facet: IntArray, local: Array) -> tuple[Array, Array, Array]:
-        """Points (m, 3), unit normals (m, 3) and weights (m, 4) at local coordinates (m, 2) of facets (m,)."""
+    def _at(
+        self, current: Array, normals: Array, facet: IntArray, local: Array
+    ) -> tuple[Array, Array, IntArray, Array]:
+        """Points (m, 3), unit normals (m, 3), nodes and weights (m, 4), with quadratic facets (m, 9), at local
+        coordinates (m, 2) of facets (m,)."""
         weights = shape_of(self.facets[facet, 3] < 0, local)
-        point = np.einsum("mr,mrd->md", weights, current[self.facets[facet]])
-        normal = np.einsum("mr,mrd->md", weights, normals[facet])
-        return point, normal / np.linalg.norm(normal, axis=1, keepdims=True), weights
+        nodes = self.facets[facet]
+        point = np.einsum("mr,mrd->md", weights, current[nodes])
+        normal = np.einsum("mr,mrd->md", weights, normals[self.groups[facet]])
+        if self.curved.any():
+            nodes, weights = np.pad(nodes, ((0, 0), (0, 5))), np.pad(weights, ((0, 0), (0, 5)))
+            mine = np.flatnonzero(self.curved[self.pattern[facet]])
+            elements = self.elements[facet[mine]]
+            own = self.element_weights(facet[mine], local[mine])
+            point[mine] = np.einsum("mr,mrd->md", own, current[elements])
+            normal[mine] = np.einsum("mr,mrd->md", own, normals[self.element_groups[facet[mine]]])
+            nodes[mine], weights[mine] = elements, own
+        nodes = np.where(weights == 0.0, 0, nodes)
+        return point, normal / np.linalg.norm(normal, axis=1, keepdims=True), nodes, weights
+
+    def element_weights(self, facet: IntArray, local: Array) -> Array:
+        """Shape functions (m, 9) of the mesh's own facets at coordinates (m, 2) on their parts (m,), 0 in unused
+        places."""
+        corners = shape_of(self.facets[facet, 3] < 0, local)
+        weights = np.zeros((len(facet), 9))
+        for number, (kind, split) in enumerate(zip(self.kinds, self.splits, strict=True)):
+            mine = np.flatnonzero(self.pattern[facet] == number)
+            if len(mine):
+                own = [c for c in split if c >= 0]
+                at = reference_nodes(kind)
+                weights[mine, : len(at)] = shape_functions(kind, corners[mine, : len(own)] @ at[own])[0]
+        weights[np.abs(weights) < NODE] = 0.0
+        return weights / weights.sum(axis=1, keepdims=True)
 
     def _beside(
         self, slaves: Array, current: Array, chosen: list[BoolArray]
@@ -248,9 +300,63 @@ class FacetSurface:
         edge = np.concatenate([p[1] for p in picked])
         begin = current[self.facets[facet, edge]]
         end = current[self.facets[facet, _following(self.facets)[facet, edge]]]
-        which, along, distance = nearest_edges(slaves, begin, end)
+        which, along, distance = nearest_edges(slaves, begin, end, self._edge_bends(current, facet, edge))
         facet, edge = facet[which], edge[which]
         return facet, edge_coordinates(self.facets[facet, 3] < 0, edge, along), edge, distance
+
+    def _edge_bends(self, current: Array, facet: IntArray, edge: IntArray) -> Array:
+        """What edges (b, 3) [m] of facets (b,) are bent by: begin + t (end − begin) + t (1 − t) bend."""
+        begin, end = self.facets[facet, edge], self.facets[facet, _following(self.facets)[facet, edge]]
+        chord = 0.5 * (current[begin] + current[end])
+        bend = np.zeros((len(facet), 3))
+        mine = np.flatnonzero(self.curved[self.pattern[facet]])
+        if len(mine):
+            half = edge_coordinates(self.facets[facet[mine], 3] < 0, edge[mine], np.full(len(mine), 0.5))
+            weights = self.element_weights(facet[mine], half)
+            bend[mine] = 4.0 * (np.einsum("mr,mrd->md", weights, current[self.elements[facet[mine]]]) - chord[mine])
+            # What rounding leaves of a straight edge is none.
+            size = np.linalg.norm(current[end[mine]] - current[begin[mine]], axis=1)
+            bend[mine[np.linalg.norm(bend[mine], axis=1) < STRAIGHT * size]] = 0.0
+        return bend
+
+    def at_corners(self, location: Location, slaves: Array, slave_normals: Array) -> Location:
+        """Places of undisplaced slaves (m, 3) [m] where those that lie on an outward edge look the way their own
+        normals (m, 3) say, as far as the normals of both sides of the edge enclose that.
+
+        Which of its sides is nearer there rounding decides. Slaves without a normal keep that side's. Where edges meet,
+        that one counts which lets a slave look most its own way.
+        """
+        if not self.sharp.any():
+            return location
+        size = np.linalg.norm(np.ptp(self.positions[self.facets[:, :3]], axis=1), axis=1)
+        facet, _, _, distance = self._beside(slaves, self.positions, [self.sharp])
+        on = (distance <= EDGE_TOLERANCE * size[facet]) & np.any(slave_normals, axis=1)
+        which = np.flatnonzero(on)
+        if not len(which):
+            return location
+        facet, edge = np.nonzero(self.sharp & (np.arange(len(self.facets))[:, None] < self.neighbours))
+        begin, end = self.facets[facet, edge], self.facets[facet, _following(self.facets)[facet, edge]]
+        bends = self._edge_bends(self.positions, facet, edge)
+        smoothed = self._normals(self.positions)
+        normal = location.normal.copy()
+        for slave in which.tolist():
+            place, own = slaves[slave], -slave_normals[slave]
+            best = -np.inf
+            close = np.linalg.norm(0.5 * (self.positions[begin] + self.positions[end]) - place, axis=1) <= size[facet]
+            for k in np.flatnonzero(close).tolist():
+                ends = self.positions[begin[k : k + 1]], self.positions[end[k : k + 1]]
+                _, along, far = nearest_edges(place[None], *ends, bends[k : k + 1])
+                if far[0] > EDGE_TOLERANCE * size[facet[k]]:
+                    continue
+                both = np.zeros((2, 3))
+                for i, side in enumerate((facet[k], self.neighbours[facet[k], edge[k]])):
+                    for node, part in ((begin[k], 1.0 - along[0]), (end[k], along[0])):
+                        both[i] += part * smoothed[self.groups[side, int(np.argmax(self.facets[side] == node))]]
+                both /= np.linalg.norm(both, axis=1, keepdims=True)
+                looks = _between(both[0], both[1], (ends[1] - ends[0])[0], own)
+                if looks is not None and looks @ own > best:
+                    best, normal[slave] = looks @ own, looks
+        return replace(location, normal=normal, gap=np.sum(normal * (slaves - location.point), axis=1))
 
     def _over_rim(self, facet: IntArray, offset: Array, normal: Array, normals: Array, current: Array) -> BoolArray:
         """Whether slaves at an offset (q, 3) from the surface's own edge stand over that edge as far as can be told.
@@ -260,7 +366,8 @@ class FacetSurface:
         angle is forgiven, once for the normal and once for the edge itself, which is as straight as the facet is flat.
         """
         corners = self.facets[facet] >= 0
-        deviation = np.linalg.norm(normals[facet] - _facet_normals(current, self.facets[facet])[:, None], axis=2)
+        at_corners = normals[self.groups[facet]]
+        deviation = np.linalg.norm(at_corners - _facet_normals(current, self.facets[facet])[:, None], axis=2)
         doubt = np.where(corners, deviation, 0.0).max(axis=1, initial=0.0)
         doubt[doubt < 1e-12] = 0.0
         height = np.sum(offset * normal, axis=1)
@@ -279,6 +386,18 @@ class FacetSurface:
         side = np.where(np.sum(mean * offset, axis=1) < 0, -1.0, 1.0)
         scaled = side[:, None] * offset / np.where(apart, distance, 1.0)[:, None]
         return np.where(apart[:, None], scaled, mean)
+
+
+def _between(one: Array, two: Array, along: Array, own: Array) -> Array | None:
+    """The direction (3,) nearest to another among those that the normals of both sides of an edge enclose; None into a
+    notch. along (3,): with the first side on its left."""
+    along = along / np.linalg.norm(along)
+    across = np.cross(along, one)
+    turn, angle = (np.arctan2(v @ across, v @ one) for v in (two, own))
+    if turn <= 0.0:
+        return None
+    angle = np.clip(angle, 0.0, turn)
+    return np.cos(angle) * one + np.sin(angle) * across
 
 
 def _splits(kind: str) -> list[list[int]]:
@@ -305,6 +424,59 @@ def _corner_tangents(kind: str, split: list[int]) -> Array:
     for j, towards in enumerate((np.roll(corners, -1, axis=0), np.roll(corners, 1, axis=0))):
         found[: len(corners), j, : slopes.shape[2]] = np.einsum("eqr,qe->qr", slopes, towards - corners)
     return found
+
+
+def _edges_of_parts(
+    edges: Edges, chosen: BoolArray, blocks: Blocks, kinds: tuple[str, ...], splits: tuple[tuple[int, ...], ...]
+) -> BoolArray:
+    """Which edges (f, 4) of the parts of the mesh's own facets lie on chosen (e,) edges between these."""
+    whole = np.zeros((sum(len(block) for block in blocks.values()), 4), dtype=bool)
+    whole[edges.facets[chosen], edges.places[chosen]] = True
+    starts = dict(zip(blocks, np.cumsum([0, *(len(block) for block in blocks.values())]), strict=False))
+    found: list[BoolArray] = []
+    for kind, split in zip(kinds, splits, strict=True):
+        count = 3 if kind.startswith("triangle") else 4
+        own = [c for c in split if c >= 0]
+        mine = whole[starts[kind] : starts[kind] + len(blocks[kind])]
+        of_part = np.zeros((len(mine), 4), dtype=bool)
+        for place, pair in enumerate(zip(own, own[1:] + own[:1], strict=True)):
+            for edge in range(count):
+                if set(pair) <= {edge, (edge + 1) % count, count + edge}:
+                    of_part[:, place] = mine[:, edge]
+        found.append(of_part)
+    return np.concatenate(found)
+
+
+def _element_groups(
+    groups: IntArray, kinds: tuple[str, ...], splits: tuple[tuple[int, ...], ...], pattern: IntArray
+) -> IntArray:
+    """Numbers (f, 9) of the smoothed normals at the nodes of the mesh's own facet of which each is a part, from those
+    (f, 4) at the corners of all of its parts; 0 in unused places."""
+    found = np.zeros((len(groups), 9), dtype=np.int64)
+    for kind in set(kinds):
+        parts = [number for number, other in enumerate(kinds) if other == kind]
+        rows = [np.flatnonzero(pattern == number) for number in parts]
+        for number, those in zip(parts, rows, strict=True):
+            for corner, node in enumerate(c for c in splits[number] if c >= 0):
+                for other in rows:
+                    found[other, node] = groups[those, corner]
+    return found
+
+
+@cache
+def _polynomial_of(kind: str, split: tuple[int, ...]) -> Array:
+    """Coefficients (11, 9) in `MONOMIALS` of the coordinates on a part of a split of the nodes of a facet of a kind."""
+    own = [c for c in split if c >= 0]
+    at = reference_nodes(kind)
+    grid = np.stack(np.meshgrid(np.linspace(0, 1, 4), np.linspace(0, 1, 4), indexing="ij"), axis=-1).reshape(-1, 2)
+    x, y = grid.T
+    corners = np.stack([1 - x - y, x, y] if len(own) == 3 else [(1 - x) * (1 - y), x * (1 - y), x * y, (1 - x) * y])
+    values = shape_functions(kind, corners.T @ at[own])[0]
+    powers = x[:, None] ** MONOMIALS[:, 0] * y[:, None] ** MONOMIALS[:, 1]
+    found = np.zeros((len(MONOMIALS), 9))
+    found[:, : len(at)] = np.linalg.lstsq(powers, values, rcond=None)[0]
+    # Those of shape functions on halves are multiples of 1/8, and rounding is none of them.
+    return np.round(8.0 * found) / 8.0
 
 
 def _following(facets: IntArray) -> IntArray:

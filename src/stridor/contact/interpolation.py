@@ -1,14 +1,15 @@
 """Where a point of a master surface lies in the finite element below it, and with which weights its nodes follow.
 
-The search of a location works on linear facets and splines; forces and displacements are those of the mesh's own,
-maybe quadratic, facets. The weights are exact for what the element interpolates, positions among them.
+In the plane the search of a location works on splines; forces and displacements are those of the mesh's own, maybe
+quadratic, facets, on which the search in space works itself. The weights are exact for what the element interpolates,
+positions among them.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..mesh.facets import reference_nodes, shape_functions
+from ..mesh.facets import shape_functions
 from ..typing import Array, IntArray
 from .curve import Curve
 from .facets import FacetSurface
@@ -26,30 +27,8 @@ def element_weights(
     current (k, d) [m]: where the master's nodes are now. Unused places hold node 0 with weight 0.
     """
     if isinstance(master, FacetSurface):
-        return _on_facets(master, location, points, current)
+        return location.nodes, location.weights
     return _on_line(master, location, points, current)
-
-
-def _on_facets(
-    surface: FacetSurface, location: Location, points: Array, current: Array
-) -> tuple[IntArray, Array]:
-    nodes = surface.elements[location.facet]
-    weights = np.zeros(nodes.shape)
-    pattern = surface.pattern[location.facet]
-    for number, (kind, split) in enumerate(zip(surface.kinds, surface.splits, strict=True)):
-        mine = np.flatnonzero(pattern == number)
-        if not len(mine):
-            continue
-        corners = [c for c in split if c >= 0]
-        # As the corners of the linear part interpolate: exact but for curved edges and middles off the middle.
-        local = location.weights[mine][:, : len(corners)] @ reference_nodes(kind)[corners]
-        r = len(reference_nodes(kind))
-        if kind not in LINEAR:
-            element = current[nodes[mine, :r]]
-            local = _refined(kind, local, element, points[mine], location.normal[mine])
-        weights[mine, :r] = shape_functions(kind, local)[0]
-    weights[np.abs(weights) < 1e-12] = 0.0
-    return np.where(weights == 0.0, 0, nodes), weights
 
 
 def _on_line(curve: Curve, location: Location, points: Array, current: Array) -> tuple[IntArray, Array]:

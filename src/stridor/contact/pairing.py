@@ -85,7 +85,7 @@ def pair_surface(
     own = (facing[:, None] * d + np.arange(d)).ravel()
     slave, area, drift = Rows(slave.free[own], slave.lift[own]), area[facing], drift[facing]
     position = slave_position[facing]
-    if isinstance(master, Curve):
+    if isinstance(master, Curve | FacetSurface):
         location = master.at_corners(location, position, slave_normals[facing])
     tolerance = allowed_overlap
     if tolerance is None:

@@ -1,7 +1,7 @@
 """Nearest places on the mesh's own, maybe quadratic, faces: lines in the plane and in space, facets in space.
 
-A slave node that lies on a curved face lies beside the chords of it by h²/8R. Ties ask for the distance from the face,
-so the search on linear facets only says where to begin.
+Ties ask for the nearest place on the faces themselves, not for that along the smoothed normals of the search for
+contacts, which says where to begin.
 """
 
 from __future__ import annotations

@@ -189,7 +189,7 @@ def over_gaps(
     facing (q,) of b at position (b, d) [m] and a location (b,), above some of these."""
     over = np.zeros(len(position), dtype=bool)
     over[facing] = True
-    piece = _piece_below(master, location)
+    piece = piece_below(master, location)
     found: dict[str, BoolArray] = {}
     for kind, given in facets.items():
         block = np.asarray(given)
@@ -206,7 +206,35 @@ def over_gaps(
     return found
 
 
-def _piece_below(master: Curve | FacetSurface, location: Location) -> IntArray:
+def steps_between_pieces(
+    facets: Blocks, own: IntArray, master: Curve | FacetSurface, location: Location
+) -> tuple[IntArray, Array]:
+    """Slave nodes (q,), numbered at a location (m,), on facets over more than one piece of the master, and by how much
+    (q,) [m] another piece lies higher or lower there: no node has a place on more than one.
+
+    facets between b nodes, own (b,) their numbers, −1 for none. Between normals on both sides a curve has no steps.
+    """
+    piece = piece_below(master, location)
+    nodes: list[IntArray] = [np.zeros(0, dtype=np.int64)]
+    steps: list[Array] = [np.zeros(0)]
+    for block in facets.values():
+        taking = own[block]
+        for i in range(block.shape[1]):
+            for j in range(block.shape[1]):
+                a, b = taking[:, i], taking[:, j]
+                both = (a >= 0) & (b >= 0)
+                a, b = a[both], b[both]
+                a, b = a[piece[a] != piece[b]], b[piece[a] != piece[b]]
+                mean = 0.5 * (location.normal[a] + location.normal[b])
+                nodes.append(a)
+                steps.append(np.abs(np.sum(mean * (location.point[b] - location.point[a]), axis=1)))
+    which, number = np.unique(np.concatenate(nodes), return_inverse=True)
+    largest = np.zeros(len(which))
+    np.maximum.at(largest, number, np.concatenate(steps))
+    return which, largest
+
+
+def piece_below(master: Curve | FacetSurface, location: Location) -> IntArray:
     """Numbers (b,) of the connected pieces of a master that places (b,) are on."""
     first = np.repeat(master.facets[:, :1], master.facets.shape[1] - 1, axis=1).ravel()
     other = master.facets[:, 1:].ravel()

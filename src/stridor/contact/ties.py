@@ -77,9 +77,9 @@ class Bond:
 def tie(slave_points: Array, master: MasterSurface, *, where: str, tolerance: float) -> NodeTies:
     """Places of slave points (s, d) [m] on the undisplaced master, as its facets interpolate.
 
-    The facets themselves count, straight or quadratic, not the spline through their nodes nor the linear facets that
-    they are split into. Raises CaseError naming ``where`` for a slave point
-    farther than ``tolerance`` [m] from the master, over its edges included, and for a master without nodes.
+    The facets themselves count, straight or quadratic, not the spline through their nodes. Raises CaseError naming
+    ``where`` for a slave point farther than ``tolerance`` [m] from the master, over its edges included, and for a
+    master without nodes.
     """
     if master.node_count == 0:
         raise CaseError(where, None, "nothing can be tied to an obstacle; fix those nodes by a support instead")

@@ -13,6 +13,9 @@ from ..case.bodies import BeamBody, MassBody, MatrixBody, ObstacleBody, SolidBod
 from ..case.matrix_checks import MU
 from ..case.schema import Contact, Friction, Load, Spring, TabulatedTable, Tie
 from ..case.usual import USUAL
+from ..contact.curve import Curve
+from ..contact.facets import CORNER_DEG, FacetSurface
+from ..contact.rim import steps_between_pieces
 from ..errors import AnalysisError
 from ..matrices.report import LOST, NO_FRICTION
 from ..mesh.hanging import hanging
@@ -26,12 +29,14 @@ from ..temporal.inputs import unfit_in_time
 from ..temporal.schedule import lay_out
 from ..temporal.settings import coarse
 from ..temporal.simulate import plan, step_of
+from ..typing import Array
 from .matrix_reports import matrix_reports
 from .pressed import unpressed_in_time
 from .settings import phases_of, settings_of
 from .unit_warnings import matrix_warnings, resolution_warnings, unit_warnings
 from .workspace import Problem, Workspace
 
+STEP = 1e-6  # of a slave's facet: what pieces of a flat master below it may be apart in height
 MOST_THROUGH = 0.2  # of a sliding velocity through a surface: facets on a curve make little of it
 
 @dataclass(frozen=True, repr=False)
@@ -400,7 +405,65 @@ def mesh_warnings(case: Case, system: System) -> list[str]:
             off = float(np.min(np.linalg.norm(solid.points - np.array(position), axis=1)))
             if off > 0.5 * largest:
                 found.append(f"{where}.points.{point}: the nearest node is {off:.3g} m away")
-    return found + _surface_warnings(case, system)
+    return found + _surface_warnings(case, system) + edge_warnings(system) + piece_warnings(system)
+
+
+def piece_warnings(system: System) -> list[str]:
+    """Slave facets over pieces of a master that do not lie in one surface."""
+    found: list[str] = []
+    for surface in system.surfaces:
+        if surface.facets is None or not isinstance(surface.master, Curve | FacetSurface):
+            continue
+        nodes, steps = steps_between_pieces(
+            surface.facets.blocks, surface.facets.own, surface.master, surface.location
+        )  # fmt: skip
+        size = max(
+            float(np.linalg.norm(np.ptp(surface.location.point[row[row >= 0]], axis=0)))
+            for block in surface.facets.blocks.values() for row in surface.facets.own[block] if (row >= 0).any()
+        )  # fmt: skip
+        # Normals at the ends of a curve are one-sided, by half of a facet's angle: h²/2R over a facet.
+        some = steps > STEP * size + 4.0 * surface.master.chord_height
+        if some.any():
+            count = counted(int(some.sum()), "slave node")
+            found.append(
+                f"contact {surface.name}: {count} of facets over two pieces of the master, one up to "
+                f"{float(steps.max()):.3g} m higher than the other: each node measures its gap to one of them alone "
+                f"(the first at {_place(surface.slave_position[nodes[some][0]])}); let the slave's facets end between "
+                "the pieces, or make them small beside what is between"
+            )
+    return found
+
+
+def _place(point: Array) -> str:
+    return "(" + ", ".join(f"{x:.6g}" for x in point + 0.0) + ") m"
+
+
+def edge_warnings(system: System) -> list[str]:
+    """Edges of masters in space, where slaves are, of which facets do not tell whether they are of a curve."""
+    found: list[str] = []
+    for surface in system.surfaces:
+        if not isinstance(surface.master, FacetSurface) or not len(surface.master.doubtful):
+            continue
+        edges, places = surface.master.doubtful, surface.location.point
+        beside = 0.1 * np.linalg.norm(np.ptp(places, axis=0))
+        near = (edges[:, :3] >= places.min(axis=0) - beside) & (edges[:, :3] <= places.max(axis=0) + beside)
+        for sharp in (False, True):
+            some = edges[near.all(axis=1) & ((np.abs(edges[:, 3]) > np.radians(CORNER_DEG)) == sharp)]
+            if not len(some):
+                continue
+            angle = float(np.degrees(np.abs(some[:, 3]).max()))
+            how, what = (
+                ("one after the other", "it is taken as edges; divide it into more facets if it is a curve")
+                if sharp
+                else (
+                    "amid what is flat",
+                    "a chamfer of one row of facets or a curve, it is taken as a curve; mesh it with two rows if it "
+                    "has edges there",
+                )
+            )
+            lead = f"contact {surface.name}: edges of the master turn by {angle:.3g}° {how}"
+            found.append(f"{lead}, the first at {_place(some[0, :3])}: {what}")
+    return found
 
 
 def _surface_warnings(case: Case, system: System) -> list[str]:

@@ -13,18 +13,32 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..case import Case
 from ..case.schema import Contact as ContactCase
 from ..contact.master import MasterSurface
 from ..errors import CaseError
 from ..mesh.facets import facet_normals, nodal_normals
-from ..typing import Array, BoolArray
+from ..typing import Array, BoolArray, IntArray
 from .bodies import BuiltBody
 from .repeats import SAME, TOUCHING, Repeat, slave_positions
-from .sectors import INWARDS, NEAR, Side, clash, meets_itself, motion_words, near_of, repeats_by, samples_of, side_of
+from .sectors import (
+    INWARDS,
+    NEAR,
+    Side,
+    clash,
+    meets_itself,
+    motion_words,
+    near_of,
+    repeats_by,
+    samples_of,
+    side_of,
+    surface_of,
+)
 
-# Of the way from the middle of a slave's facet to its nodes: what is narrower than between two of them is not seen.
+# Of the way from the middle of a slave's facet to its nodes: what is narrower than between two of them is seen at the
+# ends of the master alone.
 FRACTIONS = (0.3, 0.6, 1.0 - 2.0 * INWARDS)
 # Other steps than the first that are looked at where no number of them leads back to the beginning.
 MOST = 32
@@ -32,6 +46,8 @@ MOST = 32
 DIGITS = 1e-5
 # Between the normals of a facet and of its nodes, which are half way to the next facet: where facets turn by more than
 # 40° there is a corner, and no curve.
+NOTHING_HERE = "nothing is below it, and something below another sector"
+NOTHING_THERE = "something is below it, and nothing below another sector"
 SHARP = 2.0 * math.sin(math.radians(10.0)) * (1.0 + TOUCHING)
 
 
@@ -77,6 +93,8 @@ def require_seen_alike(
         # An obstacle is known to the digits of its numbers, facets of a curve to what is between it and its chords.
         apart = np.full(len(points), DIGITS * extent) if master is None else SAME * size + _bulge(master)
         at, otherwise = _differs(seen(whole), whole, [turn for _, turn in moved], size, apart, master, both=both)
+        if at is None and master is not None and slave.facets:
+            at, otherwise = _ends_differ(seen, slave, master, repeat, both=both)
         if at is not None:
             _refuse(name, contact, repeat, at, otherwise)
 
@@ -155,14 +173,89 @@ def _differs(
         for each, largest in zip(speed, scale, strict=True):
             away |= np.linalg.norm(each[there] - each[here] @ turn.T, axis=1) > SAME * largest
         for where, words in (
-            (lone, "nothing is below it, and something below another sector"),
-            (empty, "something is below it, and nothing below another sector"),
+            (lone, NOTHING_HERE),
+            (empty, NOTHING_THERE),
             (uneven, "it is at another distance below another sector"),
             (same & away, "it moves in another direction below another sector"),
         ):
             if where.any():
                 return places[int(np.argmax(where))], words
     return None, ""
+
+
+def _ends_differ(
+    seen: Callable[[Array], Seen], slave: Side, master: Side, repeat: Repeat, *, both: bool
+) -> tuple[Array | None, str]:
+    """As `_differs` right beyond the ends of a master: gaps there may be too narrow for points within the slave's
+    facets."""
+    at, _, sizes = samples_of(slave.points, slave.facets)
+    ends, outward, bend = _ends(master)
+    if not len(ends):
+        return None, ""
+    size = sizes[np.asarray(cKDTree(at).query(ends)[1], dtype=np.int64)]
+    # Edges of curves are as uncertain as their chords are off these.
+    off = SAME * size + bend
+    over = surface_of(slave).locate(ends + (off + SAME * size)[:, None] * outward)
+    held = np.flatnonzero(over.inside & (np.abs(over.gap) <= NEAR * size))
+    points, size, off = over.point[held], size[held], off[held]
+    count, moved = len(held), list(_moved(repeat, points, master, both=both)) if len(held) else []
+    if not moved:
+        return None, ""
+    places = np.concatenate([points, *(there for there, _ in moved)])
+    found = seen(places).surface.locate(places)
+    along = np.linalg.norm(places - found.point, axis=1) ** 2 - found.gap**2
+    empty = ~found.inside & (np.sqrt(np.maximum(along, 0.0)) > 0.5 * np.resize(off, len(places)))
+    full = found.inside & (np.abs(found.gap) <= NEAR * np.resize(size, len(places)))
+    for number in range(1, len(moved) + 1):
+        there = slice(number * count, (number + 1) * count)
+        lone = full[there] & empty[:count]
+        if lone.any():
+            return points[int(np.argmax(lone))], NOTHING_HERE
+        lone = full[:count] & empty[there] & both
+        if lone.any():
+            return points[int(np.argmax(lone))], NOTHING_THERE
+    return None, ""
+
+
+def _ends(side: Side) -> tuple[Array, Array, Array]:
+    """Middles (q, d) [m] of the edges of a surface, in the plane its ends, unit directions (q, d) out of it there, and
+    how far (q,) [m] these edges are off the curves that they may be chords of."""
+    d = side.points.shape[1]
+    edges: list[IntArray] = []
+    middles: list[Array] = []
+    for kind, block in side.facets.items():
+        corners = block[:, :2] if d == 2 else block[:, : 3 if kind.startswith("triangle") else 4]
+        centre = side.points[corners].mean(axis=1)
+        for corner in range(corners.shape[1]):
+            pair = corners[:, [corner, corner]] if d == 2 else corners[:, [corner, (corner + 1) % corners.shape[1]]]
+            edges.append(np.sort(pair, axis=1))
+            middles.append(centre)
+    both, centre = np.concatenate(edges), np.concatenate(middles)
+    _, first, times = np.unique(both, axis=0, return_index=True, return_counts=True)
+    alone = first[times == 1]
+    pair, centre = both[alone], centre[alone]
+    begin, end = side.points[pair[:, 0]], side.points[pair[:, 1]]
+    along = end - begin
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    along = np.divide(along, length, out=np.zeros_like(along), where=length > 0)
+    outward = 0.5 * (begin + end) - centre
+    outward -= np.sum(outward * along, axis=1, keepdims=True) * along
+    outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-300)
+    bend = np.zeros(len(pair))
+    if d == 3:
+        # Half of the angle to the next edge at each end, which on a circle is that between chord and tangent.
+        order = np.argsort(pair.ravel(), kind="stable")
+        node = pair.ravel()[order]
+        twice = np.flatnonzero(node[1:] == node[:-1])
+        one, other = order[twice] // 2, order[twice + 1] // 2
+        cosine = np.abs(np.sum(along[one] * along[other], axis=1))
+        sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
+        slight = cosine > np.cos(np.radians(40.0))
+        longer = np.maximum(length[one, 0], length[other, 0])
+        off = np.where(slight, longer * sine / 4.0, 0.0)
+        np.maximum.at(bend, one, off)
+        np.maximum.at(bend, other, off)
+    return 0.5 * (begin + end), outward, bend
 
 
 def _refuse(name: str, contact: ContactCase, repeat: Repeat, at: Array, otherwise: str) -> None:

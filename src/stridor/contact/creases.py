@@ -1,0 +1,354 @@
+"""Which edges between the facets of a surface in space are edges of the body though they turn by little.
+
+As `kinks` has it for lines: facets of a curve turn by a like amount over edges that follow each other, a chamfer turns
+once, between flats. So of an edge the edges around the far corners of the facets on both sides are asked, as far as
+they turn about the same axis and the same way. Quadratic facets turn themselves: their edges count by the angle between
+the true normals on both sides, and one that turns by no more than the facets beside it do is part of a curve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from ..mesh.facets import reference_nodes, shape_functions
+from ..mesh.model import Blocks
+from ..typing import Array, BoolArray, IntArray
+from .kinks import EVEN, LIKE, RATIO, SLIGHT
+
+# cos of the angle between edges that continue each other, or lie side by side.
+ALONG = np.cos(np.radians(30.0))
+# Where an arc begins beside a flat, its first edge turns by half of what the next do.
+BEGINS = 2.0 / 3.0
+# Edges sharper than the corner angle and no sharper than this that follow each other alike may be a coarse curve.
+COARSE = np.radians(60.0)
+
+
+@dataclass(frozen=True)
+class Edges:
+    """e edges between two of the facets of a surface, and what they turn by.
+
+    facets (e, 2), and which of their edges (e, 2) it is; nodes (e, 2) at its ends; along (e, 3) unit and inward
+    (e, 2, 3) across it into both facets, unit; middle (e, 3) [m]; turn (e,) [rad] between the normals on both sides,
+    positive where the body is convex; own (e, 2) [rad]: what each facet turns by from there to its other side.
+    """
+
+    facets: IntArray
+    places: IntArray
+    nodes: IntArray
+    along: Array
+    inward: Array
+    middle: Array
+    turn: Array
+    own: Array
+
+
+@dataclass(frozen=True)
+class Creases:
+    """Of e edges: which are edges of the body, by angle or alone between flats (e,); of which that cannot be told
+    (e,): they are taken as what ``edge`` says."""
+
+    edge: BoolArray
+    doubtful: BoolArray
+
+
+def edges_of(positions: Array, blocks: Blocks) -> Edges:
+    """The edges between facets by kind of a surface with nodes at positions (k, 3) [m], numbered block by block."""
+    inner, own = [], []
+    for kind, block in blocks.items():
+        count = 3 if kind.startswith("triangle") else 4
+        at, c = reference_nodes(kind), np.arange(count)
+        middles = 0.5 * (at[c] + at[(c + 1) % count])
+        # Opposite to an edge: a triangle's third corner, the middle of the other side of a quadrilateral.
+        opposite = at[(c + 2) % count] if count == 3 else middles[(c + 2) % 4]
+        near, far = (_normals(kind, positions[block], local) for local in (middles, opposite))
+        if count == 4 and len(at) == 4:
+            # A warped quadrilateral has the normal of its diagonals, as one that does not turn itself.
+            one, other = (positions[block[:, i + 2]] - positions[block[:, i]] for i in (0, 1))
+            across = np.cross(one, other)
+            near = far = np.repeat((across / np.linalg.norm(across, axis=1, keepdims=True))[:, None], 4, axis=1)
+        pad = ((0, 0), (0, 4 - count))
+        inner.append(np.pad(near, (*pad, (0, 0))))
+        own.append(np.pad(near - far, (*pad, (0, 0))))
+    facets, normals, change = corners_of(blocks), np.concatenate(inner), np.concatenate(own)
+    valid = facets >= 0
+    following = np.where(facets[:, 3:] < 0, [[1, 2, 0, 0]], [[1, 2, 3, 0]])
+    begin, end = facets[valid], np.take_along_axis(facets, following, axis=1)[valid]
+    owner, place = np.nonzero(valid)
+    order = np.lexsort((begin > end, np.maximum(begin, end), np.minimum(begin, end)))
+    low, high = np.minimum(begin, end)[order], np.maximum(begin, end)[order]
+    first = np.flatnonzero((low[1:] == low[:-1]) & (high[1:] == high[:-1]))
+    pair = np.stack([order[first], order[first + 1]], axis=1)
+    sides, places = owner[pair], place[pair]
+    nodes = np.stack([begin[pair[:, 0]], end[pair[:, 0]]], axis=1)
+    along = positions[nodes[:, 1]] - positions[nodes[:, 0]]
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-300)
+    n = normals[sides, places]
+    inward = np.stack([np.cross(n[:, 0], along), np.cross(along, n[:, 1])], axis=1)
+    length = np.linalg.norm(inward, axis=2, keepdims=True)
+    inward = np.divide(inward, length, out=np.zeros_like(inward), where=length > 0)
+    sine = np.sum(np.cross(n[:, 0], n[:, 1]) * along, axis=1)
+    turn = np.arctan2(sine, np.sum(n[:, 0] * n[:, 1], axis=1))
+    turned = np.abs(np.sum(change[sides, places] * inward, axis=2))
+    return Edges(
+        sides, places, nodes, along, inward, positions[nodes].mean(axis=1), turn,
+        2.0 * np.arcsin(np.minimum(0.5 * turned, 1.0)),
+    )  # fmt: skip
+
+
+def corners_of(blocks: Blocks) -> IntArray:
+    """Corners (f, 4) of facets by kind, block by block, −1 in the last place of a triangle."""
+    sides = [(3 if kind.startswith("triangle") else 4, block) for kind, block in blocks.items()]
+    return np.concatenate([np.pad(b[:, :n], ((0, 0), (0, 4 - n)), constant_values=-1) for n, b in sides])
+
+
+def _normals(kind: str, facets: Array, local: Array) -> Array:
+    """Unit normals (f, q, 3) of facets (f, r, 3) of a kind at reference coordinates (q, 2), zero where none is."""
+    a, b = np.einsum("eqr,frd->efqd", shape_functions(kind, local)[1], facets)
+    normal = np.cross(a, b)
+    length = np.linalg.norm(normal, axis=2, keepdims=True)
+    return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+
+
+def creases(edges: Edges, corners: IntArray, corner_angle: float) -> Creases:
+    """Which edges between facets with corners (f, 4), −1 in the last place of a triangle, are edges of the body.
+
+    corner_angle [rad]: beyond it all are. Others are where they stand alone: on both sides facets are flat, or turn by
+    a tenth. A side that ends with the facet at an edge of the surface, or at a sharp one, says nothing: then the other
+    side has to be flat. Three and more at even distances, that turn alike, are a curve whose facets were divided.
+    """
+    size = np.abs(edges.turn)
+    sharp = size > corner_angle
+    if not (size > SLIGHT).any():
+        return Creases(sharp, sharp)
+    around = _Around(edges, corners, sharp)
+    alike, opposite, told = around.evidence(~sharp)
+    limit = SLIGHT + np.maximum(RATIO * alike, edges.own)
+    straight = told & (size[:, None] > limit)
+    flat = told & (np.maximum(alike, opposite) <= SLIGHT) & (size[:, None] > limit)
+    ends = ~told & (size[:, None] > SLIGHT + edges.own)
+    one = (flat[:, 0] & ends[:, 1]) | (flat[:, 1] & ends[:, 0])
+    for e in np.flatnonzero(one & ~sharp):
+        # Where the surface turns back a little farther in, the flat is an inflection.
+        one[e] = not around.turns_back(int(e), int(flat[e, 1]))
+    lone = ~sharp & (straight.all(axis=1) | one)
+    _continue(edges, lone, ~sharp & flat.any(axis=1), ~sharp & ends.all(axis=1), size)
+    curve = _even(edges, lone, sharp, len(corners))
+    lone &= ~curve
+    whole, part = _reaching(edges, lone, corners, sharp)
+    lone = whole | part
+    doubtful = _doubtful(edges, around, size, sharp, lone | curve, alike, told)
+    doubtful &= sharp | _reaching(edges, doubtful, corners, sharp | lone)[0]
+    return Creases(sharp | lone, doubtful & (sharp | _straight_on(edges, doubtful)))
+
+
+def _doubtful(
+    edges: Edges, around: _Around, size: Array, sharp: BoolArray, settled: BoolArray, alike: Array, told: BoolArray
+) -> BoolArray:
+    """Edges that a curve may have as well as a body with flats."""
+    open_ = ~sharp & ~settled & (size > SLIGHT)
+    level = told & (alike <= SLIGHT)
+    # Beside a flat an arc begins by half. Two edges of the whole angle at once may be those of a chamfer as well.
+    begins = (level[:, 0] | level[:, 1]) & (size >= BEGINS * alike.max(axis=1)) & (edges.own.max(axis=1) <= SLIGHT)
+    begins &= around.only_such(np.minimum(alike[:, 0], alike[:, 1]) > SLIGHT)
+    # Two facets, or three, between ends are as much a bent plate as a piece of a curve.
+    some = told[:, 0] | told[:, 1]
+    few = some & ~(told[:, 0] & told[:, 1]) & around.only_such(told[:, 0] & told[:, 1])
+    # A face as curved as the edge beside it is sharp.
+    beside = (size > SLIGHT + 0.5 * edges.own.max(axis=1)) & (edges.own.max(axis=1) > SLIGHT)
+    beside &= size > SLIGHT + RATIO * alike.max(axis=1)
+    likely = open_ & (begins | ~some | few | beside)
+    # Sharp ones that follow each other alike may be a curve of few facets.
+    both, _, _ = around.evidence(sharp & (size <= COARSE))
+    return likely | (sharp & (size <= COARSE) & (both.min(axis=1) * LIKE >= size))
+
+
+class _Around:
+    """Edges at the nodes of a surface."""
+
+    def __init__(self, edges: Edges, corners: IntArray, sharp: BoolArray) -> None:
+        self.edges, self.corners, self.sharp = edges, corners, sharp
+        count = int(corners.max()) + 1
+        node, edge = edges.nodes.ravel(), np.repeat(np.arange(len(edges.turn)), 2)
+        order = np.argsort(node, kind="stable")
+        self.start = np.searchsorted(node[order], np.arange(count + 1))
+        self.at = edge[order]
+        self.most = int(np.diff(self.start).max(initial=0))
+        everyone = corners[edges.facets]  # (e, 2, 4)
+        beside = (everyone < 0) | (everyone == edges.nodes[:, :1, None]) | (everyone == edges.nodes[:, 1:, None])
+        # Edges that do not turn ask for nothing.
+        self.far = np.where(beside | (np.abs(edges.turn) <= SLIGHT)[:, None, None], -1, everyone)
+
+    def each(self, which: IntArray) -> list[tuple[IntArray, IntArray]]:
+        """For nodes (q,), −1 for none: pairs of places in that list and edges there, by number."""
+        found: list[tuple[IntArray, IntArray]] = []
+        for k in range(self.most):
+            there = np.flatnonzero((which >= 0) & (self.start[which] + k < self.start[which + 1]))
+            found.append((there, self.at[self.start[which[there]] + k]))
+        return found
+
+    def evidence(self, telling: BoolArray) -> tuple[Array, Array, BoolArray]:
+        """By what edges at the far corners of both facets turn (e, 2) [rad] about each edge, the same way and the
+        other way, and whether there are (e, 2) any, of those that tell."""
+        count = len(self.edges.turn)
+        same, other, told = np.zeros((2 * count, 1)), np.zeros((2 * count, 1)), np.zeros(2 * count, dtype=bool)
+        ends, along, turn = self.edges.nodes, self.edges.along, self.edges.turn
+        flat = self.far.reshape(2 * count, 4)
+        for corner in range(4):
+            for there, found in self.each(flat[:, corner]):
+                mine = there // 2
+                apart = (ends[found][:, :, None] != ends[mine][:, None, :]).all(axis=(1, 2)) & telling[found]
+                there, found, mine = there[apart], found[apart], mine[apart]
+                part = turn[found] * np.abs(np.sum(along[found] * along[mine], axis=1)) * np.sign(turn[mine])
+                same[there, 0] = np.maximum(same[there, 0], part)
+                other[there, 0] = np.maximum(other[there, 0], -part)
+                told[there] = True
+        return same.reshape(count, 2), other.reshape(count, 2), told.reshape(count, 2)
+
+    def turns_back(self, edge: int, side: int) -> bool:
+        """Whether two facets away on a side edges turn the other way."""
+        ends = self.edges.nodes[edge]
+        near = self.far[edge, side]
+        first = np.unique(np.concatenate([self.at[self.start[n] : self.start[n + 1]] for n in near[near >= 0]]))
+        facets = np.unique(self.edges.facets[first])
+        nodes = np.unique(self.corners[facets])
+        found = np.unique(np.concatenate([self.at[self.start[n] : self.start[n + 1]] for n in nodes[nodes >= 0]]))
+        found = found[~self.sharp[found] & ~np.isin(self.edges.nodes[found], ends).any(axis=1)]
+        ahead = np.sum((self.edges.middle[found] - self.edges.middle[edge]) * self.edges.inward[edge, side], axis=1) > 0
+        part = self.edges.turn[found] * np.abs(self.edges.along[found] @ self.edges.along[edge])
+        return bool(np.any((-np.sign(self.edges.turn[edge]) * part > SLIGHT) & ahead))
+
+    def only_such(self, amid: BoolArray) -> BoolArray:
+        """Edges (e,) around which others turn the same way, none of them amid (e,) a curve."""
+        count = len(self.edges.turn)
+        inner, like = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+        ends, along, turn = self.edges.nodes, self.edges.along, self.edges.turn
+        flat = self.far.reshape(2 * count, 4)
+        for corner in range(4):
+            for there, found in self.each(flat[:, corner]):
+                mine = there // 2
+                part = turn[found] * np.abs(np.sum(along[found] * along[mine], axis=1)) * np.sign(turn[mine])
+                near = (ends[found][:, :, None] != ends[mine][:, None, :]).all(axis=(1, 2)) & (part > SLIGHT)
+                like[mine[near]] = True
+                inner[mine[near & amid[found]]] = True
+        return like & ~inner
+
+
+def _continue(edges: Edges, lone: BoolArray, beside: BoolArray, unknown: BoolArray, size: Array) -> None:
+    """Edges beside (e,) a flat that go straight on where one that stands alone ends, and turn alike, are of the same
+    crease; those of which nothing around says anything (e,) are of the body that others are of, as in a mitre."""
+    count = int(edges.nodes.max(initial=-1)) + 1
+    front = np.flatnonzero(lone)
+    waiting = np.flatnonzero((beside | unknown) & ~lone)
+    while len(front) and len(waiting):
+        by_node: dict[int, list[int]] = {}
+        for e in front.tolist():
+            for n in edges.nodes[e].tolist():
+                by_node.setdefault(n, []).append(e)
+        known = np.zeros(count, dtype=bool)
+        known[list(by_node)] = True
+        new: list[int] = []
+        for e in waiting[known[edges.nodes[waiting]].any(axis=1)].tolist():
+            for other in {o for n in edges.nodes[e].tolist() for o in by_node.get(n, [])}:
+                like = edges.turn[e] * edges.turn[other] > 0 and size[e] <= LIKE * size[other] <= LIKE**2 * size[e]
+                if unknown[e] or (like and abs(float(edges.along[e] @ edges.along[other])) >= ALONG):
+                    new.append(e)
+                    break
+        front = np.array(new, dtype=np.int64)
+        lone[front] = True
+        waiting = waiting[~lone[waiting]]
+
+
+def _reaching(edges: Edges, chosen: BoolArray, corners: IntArray, others: BoolArray) -> tuple[BoolArray, BoolArray]:
+    """Which chosen edges (e,) belong to lines that close or reach ends of the surface or other edges at all of their
+    ends, and which to lines of more than one edge that do at some: no body has an edge that begins and ends amid a
+    smooth face, but facets of bad shape do."""
+    count = int(corners.max()) + 1
+    if not chosen.any():
+        return chosen, chosen
+    following = np.where(corners[:, 3:] < 0, [[1, 2, 0, 0]], [[1, 2, 3, 0]])
+    valid = corners >= 0
+    begin, end = corners[valid], np.take_along_axis(corners, following, axis=1)[valid]
+    once, times = np.unique(np.minimum(begin, end) * count + np.maximum(begin, end), return_counts=True)
+    held = np.zeros(count, dtype=bool)
+    held[np.stack(np.divmod(once[times == 1], count))] = True
+    held[edges.nodes[others & ~chosen]] = True
+    a, b = edges.nodes[chosen].T
+    line = np.asarray(
+        connected_components(sp.coo_array((np.ones(len(a)), (a, b)), shape=(count, count)), directed=False)[1]
+    )
+    degree = np.bincount(np.concatenate([a, b]), minlength=count)
+    closed, reaches = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
+    closed[line[(degree == 1) & ~held]] = False
+    nodes = np.bincount(line[degree > 0], minlength=count)
+    closed |= np.bincount(line[a], minlength=count) >= np.maximum(nodes, 1)  # round a face, and maybe on from there
+    reaches[line[held & (degree > 0)]] = True
+    reaches &= np.bincount(line[a], minlength=count) > 1
+    whole, part = chosen.copy(), chosen.copy()
+    whole[chosen], part[chosen] = closed[line[a]], reaches[line[a]]
+    return whole, part
+
+
+def _straight_on(edges: Edges, chosen: BoolArray) -> BoolArray:
+    """Which chosen edges (e,) belong to lines that go straight on at every node: others cut off a corner."""
+    which = np.flatnonzero(chosen)
+    if not len(which):
+        return chosen
+    node, edge = edges.nodes[which].ravel(), np.repeat(which, 2)
+    count = int(node.max(initial=0)) + 1
+    order = np.argsort(node, kind="stable")
+    bends = np.zeros(count, dtype=bool)
+    for lot in np.split(order, np.flatnonzero(np.diff(node[order])) + 1):
+        along = edges.along[edge[lot]]
+        bends[node[lot[0]]] = np.abs(along @ along[0]).min() < ALONG
+    a, b = edges.nodes[which].T
+    graph = sp.coo_array((np.ones(len(a)), (a, b)), shape=(count, count))
+    line = np.asarray(connected_components(graph, directed=False)[1])
+    bent = np.zeros(count, dtype=bool)
+    bent[line[bends]] = True
+    found = chosen.copy()
+    found[which] = ~bent[line[a]]
+    return found
+
+
+def _even(edges: Edges, lone: BoolArray, sharp: BoolArray, facets: int) -> BoolArray:
+    """Which edges (e,) that stand alone are amid like ones at even distances, over flats on both sides, or are such a
+    neighbour."""
+    if not lone.any():
+        return lone
+    joined = ~lone & ~sharp & (np.abs(edges.turn) <= SLIGHT)
+    a, b = edges.facets[joined].T
+    graph = sp.coo_array((np.ones(len(a)), (a, b)), shape=(facets, facets))
+    flat = np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+    which = np.flatnonzero(lone)
+    found = np.zeros(len(lone), dtype=bool)
+    distance = np.full((len(which), 2), np.inf)
+    partner = np.full((len(which), 2), -1)
+    number = np.full(len(lone), -1)
+    number[which] = np.arange(len(which))
+    owner, side = np.repeat(which, 2), np.tile([0, 1], len(which))
+    patch = flat[edges.facets[owner, side]]
+    order = np.argsort(patch, kind="stable")
+    for lot in np.split(order, np.flatnonzero(np.diff(patch[order])) + 1):
+        e, s = owner[lot], side[lot]
+        inward = edges.inward[e, s]
+        length = np.linalg.norm(edges.middle[e] - edges.middle[e[0]], axis=1).max(initial=0.0)
+        for k in range(len(lot)):
+            away = edges.middle[e] - edges.middle[e[k]]
+            ahead = away @ inward[k]
+            like = (edges.turn[e] * edges.turn[e[k]] > 0) & (np.abs(edges.along[e] @ edges.along[e[k]]) >= ALONG)
+            ratio = np.abs(edges.turn[e] / edges.turn[e[k]])
+            like &= (ratio <= LIKE) & (ratio >= 1.0 / LIKE) & (ahead > 1e-9 * length) & (e != e[k])
+            if like.any():
+                off = np.where(like, np.linalg.norm(away, axis=1), np.inf)
+                best = int(np.argmin(off))
+                distance[number[e[k]], s[k]] = ahead[best]
+                partner[number[e[k]], s[k]] = e[best]
+    near, far = distance.min(axis=1), distance.max(axis=1)
+    amid = np.flatnonzero(np.isfinite(far) & (far <= EVEN * near))
+    found[which[amid]] = True
+    found[partner[amid].ravel()] = True
+    return found
