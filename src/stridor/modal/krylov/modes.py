@@ -23,7 +23,7 @@ from .carried import Carried
 from .follow import Follower
 from .problem import problem_of
 from .reduced import Reduced
-from .refine import GUARD, MARGIN, NAMES, Band, converge_at, converge_over, left_vectors, projected
+from .refine import GROWTH, GUARD, MARGIN, NAMES, Band, converge_at, converge_over, left_vectors, projected
 
 _log = logging.getLogger("stridor")
 
@@ -76,8 +76,10 @@ def krylov_modes(
         inner = (False, False) if handed is None else handed.inner
         frictions = numbered_at + samples(top - numbered_at, count)
         converge_over(reduced, frictions, between=NAMES, left=left, inner=inner)
+        # A basis that was handed on has been nowhere near some of these μ.
+        to = BELIEVED if handed is None else GROWTH
         done, _, planned = at_each(
-            values, lambda at: converge_at(reduced, [at], tolerance=BELIEVED, left=left), progress
+            values, lambda at: converge_at(reduced, [at], tolerance=to, left=left), progress
         )
         if handed is not None:
             handed.take(reduced, GUARD)
