@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from ..digits import readable
-from ..errors import CaseError
+from ..errors import AnalysisError, CaseError
 from .along import MU, show_onsets_along
 from .arguments import INCOMPLETE, Call, verb
 from .option_table import Band, Branch, MaxFrequency, Mu, Range, Sort, Source, Undamped, Unstable
@@ -36,7 +37,11 @@ def steady(call: Call, mu: Mu = None) -> None:
 
     found = steady_sliding(work, call.one_friction(mu))
     call.warn(found.warnings)
-    files = write_steady(work, found, call.folder)
+    files = list[Path]()
+    try:
+        files = write_steady(work, found, call.folder)
+    except AnalysisError as error:
+        call.lost.append(error)
     for path in files:
         call.say(f"written: {path}")
     document = steady_document(found) | {"files": [str(f) for f in files]}
