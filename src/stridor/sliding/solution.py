@@ -410,8 +410,8 @@ def _require_held(
     if farthest > limit and farthest * stiffest < MECHANISM * largest:
         raise AnalysisError(
             f"steady sliding would move {_moved_most(system, np.abs(state.displacement))} by {farthest:.3g} m under "
-            f"forces of up to {largest:.3g} N: loads, interference or gaps are beyond what the stiffness takes in small "
-            "displacements; check their units and digits"
+            f"forces of up to {largest:.3g} N: loads, interference or gaps are beyond what the stiffness takes in "
+            "small displacements; check their units and digits"
         )
     raise AnalysisError(_loose(system, nodes, state.displacement))
 
