@@ -165,12 +165,14 @@ class Call:
         print_json({**document, "warnings": [*self.told, *own, *lost]})
 
     def check_friction(self, mu: float | Iterable[float] | None, where: str = "--mu") -> None:
-        """Refuse friction coefficients asked for that are not finite, warn of unusual ones. Raises CaseError."""
-        from ..case.usual import friction_oddity
+        """Refuse friction coefficients asked for that none can be, warn of unusual ones. Raises CaseError."""
+        from ..case.usual import MOST_FRICTION, TOO_MUCH, friction_oddity
 
         for value in [] if mu is None else [mu] if isinstance(mu, float | int) else mu:
             if not 0.0 <= value < INFINITY:
                 raise CaseError(where, value, "a friction coefficient is a finite number ≥ 0")
+            if value > MOST_FRICTION:
+                raise CaseError(where, value, TOO_MUCH)
             self.warn([friction_oddity(where, value)])
 
     def range_of_friction(self, text: str, where: str = "--range") -> tuple[float, float]:

@@ -39,6 +39,7 @@ from .schema import (
     Temporal,
     Tie,
 )
+from .usual import MOST_FRICTION, TOO_MUCH
 
 NODE_TOLERANCE = 1e-6  # of an element, so that twelve printed digits still hit a node
 _SIDE_TOLERANCE = 1e-9  # of the slave body's length
@@ -498,6 +499,10 @@ def _setting_problems(parts: SoundTables) -> Iterator[Problem]:
     ):
         if pair is not None and pair[0] >= pair[1]:
             yield Problem(where, pair, "the first number must be below the second")
+        elif pair is not None and pair[1] > MOST_FRICTION:
+            yield Problem(where, pair, TOO_MUCH)
+    if parts.comparison.mu and max(parts.comparison.mu) > MOST_FRICTION:
+        yield Problem("comparison.mu", parts.comparison.mu, TOO_MUCH)
     temporal = parts.temporal
     if temporal.perturbation > 0 and temporal.initial != "steady-sliding":
         yield Problem("temporal.perturbation", temporal.perturbation, 'needs initial = "steady-sliding"')
