@@ -507,7 +507,8 @@ def _setting_problems(parts: SoundTables) -> Iterator[Problem]:
     if temporal.perturbation > 0 and temporal.initial != "steady-sliding":
         yield Problem("temporal.perturbation", temporal.perturbation, 'needs initial = "steady-sliding"')
     if temporal.initial == "steady-sliding" and parts.phases and parts.phases[0].ramp > 0:
-        yield Problem("phases.0.ramp", parts.phases[0].ramp, "0 when starting from steady sliding (temporal.initial)")
+        accepted = "must be 0 when starting from steady sliding (temporal.initial)"
+        yield Problem("phases.0.ramp", parts.phases[0].ramp, accepted)
     for number, reference in enumerate(temporal.watch):
         yield from _point(parts, reference, f"temporal.watch.{number}")
 

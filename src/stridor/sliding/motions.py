@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -46,3 +47,10 @@ def words_of_friction(mu: Array) -> str:
     """Friction coefficients (m,) of contacts, as in "μ = 0.3" or "μ = 0.1 … 0.3"."""
     low, high = float(np.min(mu)), float(np.max(mu))
     return f"μ = {low:g}" if f"{low:g}" == f"{high:g}" else f"μ = {low:g} … {high:g}"
+
+
+def placed(error: Exception, mu: float, of: str = "") -> str:
+    """An error with the friction coefficient that it is about, which many name themselves; of: what that is of."""
+    told = str(error)
+    named = re.search(rf"at μ = {re.escape(f'{mu:g}')}(?![\d.e])", told)
+    return told if named else f"{told}; that is at μ = {mu:.6g}{of}"
