@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -50,7 +49,6 @@ def words_of_friction(mu: Array) -> str:
 
 
 def placed(error: Exception, mu: float, of: str = "") -> str:
-    """An error with the friction coefficient that it is about, which many name themselves; of: what that is of."""
+    """An error with the friction coefficient that it is about, which some name themselves; of: what that is of."""
     told = str(error)
-    named = re.search(rf"at μ = {re.escape(f'{mu:g}')}(?![\d.e])", told)
-    return told if named else f"{told}; that is at μ = {mu:.6g}{of}"
+    return told if f"at μ = {mu:g} (" in told else f"{told}; that is at μ = {mu:.6g}{of}"
