@@ -127,7 +127,7 @@ def test_a_restart_takes_a_run_and_no_path() -> None:
 
 
 def test_a_ramp_from_steady_sliding_is_refused_before_anything_is_computed() -> None:
-    with pytest.raises(CaseError, match=r"^phases\.0\.ramp: 1e-05 – 0 when starting from steady sliding"):
+    with pytest.raises(CaseError, match=r"^phases\.0\.ramp: 1e-05 – must be 0 when starting from steady sliding"):
         loads(template_text("two-beams"), ['temporal.initial="steady-sliding"', "phases.0.ramp=1e-5"])
 
 

@@ -14,7 +14,7 @@ from stridor.matrices import StoredMatrix, read_matrix
 pytestmark = pytest.mark.bad_input
 
 READ = (
-    ".mtx (Matrix Market, Abaqus; also .mtx.gz), .mat (MATLAB, Ansys), .npz, .npy (NumPy), .pch, .op4 (Nastran), "
+    ".mtx (Matrix Market, Abaqus; also .mtx.gz), .mat (MATLAB, Ansys), .npz, .npy (NumPy), .pch, .bdf, .op4 (Nastran), "
     ".hb, .rb, .rua, .rsa, .matrix (Harwell-Boeing, Ansys), .sti, .mas (CalculiX)"
 )
 FIVE = "row node, row freedom, column node, column freedom, value"

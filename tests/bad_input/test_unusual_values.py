@@ -6,6 +6,7 @@ import json
 import math
 import types
 import warnings
+from collections.abc import Callable
 from typing import Annotated, Any, Union, get_args, get_origin
 
 import numpy as np
@@ -19,6 +20,8 @@ from stridor.case.oddities import radians_meant
 from stridor.case.schema import ENTRIES
 from stridor.case.usual import USUAL, WITHOUT, usual_of
 from stridor.errors import AnalysisError, CaseError
+from stridor.sliding import steady_sliding
+from stridor.system import build_system
 from stridor.system.uncoupled import _apart
 
 BENCH = loads(template_text("two-beams"))
@@ -369,9 +372,42 @@ def test_friction_beyond_all_bounds_ends_in_our_words(tmp_path: Any, capsys: pyt
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         code, _, err = program(["modes", str(tmp_path / "case.toml"), "--mu", "1e308"], capsys)
-    assert code != 0
-    assert "no equilibrium" in err
+        with pytest.raises(AnalysisError, match="no equilibrium"):
+            steady_sliding(build_system(SHORT), mu=1e308)
+    assert code == 2
+    assert "--mu: 1e+308 – a friction coefficient is at most 1e+06, beyond which rounding is left" in err
     assert "Warning" not in err
+
+
+@pytest.mark.parametrize("call", [
+    lambda c: st.steady_sliding(c, 2e6), lambda c: st.modes(c, [0.1, 1e100]), lambda c: st.simulate(c, 1e100),
+    lambda c: st.sensitivities(c, mu=1e100), lambda c: st.cycles(c, 1e100), lambda c: st.cycles(c, between=(0.0, 1e9)),
+    lambda c: st.onsets(c, (0.0, 1e9)), lambda c: st.compare(c, 1e100), lambda c: st.ensemble(c, mu=[1e100]),
+    lambda c: st.stability_boundary(c, "bodies.beam1.damping.mass", "mu", x_range=(0, 1), y_range=(0, 1e9)),
+    lambda c: st.damping_map(
+        c, "bodies.beam1.damping.mass", "bodies.beam2.damping.mass", x_range=(0, 1), y_range=(0, 1), mu_range=(0, 1e9)
+    ),
+    lambda c: c.with_({"modal.friction_range": (0.0, 1e9)}), lambda c: c.with_({"comparison.mu": [1e9]}),
+    lambda c: st.reduced_model(c, {"mu": (0.0, 1e9)}), lambda c: st.rank_countermeasures(c, mu=1e100),
+])  # fmt: skip
+def test_friction_that_no_number_resolves_is_refused_at_once(call: Callable[[st.Case], object]) -> None:
+    with pytest.raises(CaseError, match="a friction coefficient is at most 1e\\+06"):
+        call(SHORT)
+
+
+@pytest.mark.parametrize("words", [
+    ("steady", "--mu", "1e100"), ("simulate", "--mu", "1e100"), ("ensemble", "--mu", "1e100"),
+    ("onsets", "--range", "0:1e9"), ("countermeasures", "--mu", "1e100"), ("cycles", "--range", "0:1e9"),
+])  # fmt: skip
+def test_verbs_say_which_option_asks_for_it(
+    words: tuple[str, ...], tmp_path: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "case.toml").write_text(SHORT.text)
+    verb, option, value = words
+    code, _, err = program([verb, str(tmp_path / "case.toml"), option, value], capsys)
+    assert code == 2
+    assert f"stridor: {option}: " in err
+    assert "a friction coefficient is at most 1e+06" in err
 
 
 @pytest.mark.filterwarnings("error")

@@ -153,6 +153,31 @@ def test_a_limit_on_file_sizes_is_a_message_and_no_crash(run_file: Path, tmp_pat
     assert list((tmp_path / "out").iterdir()) == []
 
 
+@pytest.mark.parametrize("words", [("modes", "--mu", "0.1"), ("steady",)])
+def test_a_result_that_finds_no_room_anywhere_is_printed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...]
+) -> None:
+    (tmp_path / "case.toml").write_text(st.loads(template_text("two-beams"), COARSE).text, encoding="utf-8")
+
+    def no_room(self: Path, target: Path) -> Path:
+        raise OSError(28, "No space left on device")
+
+    verb, *options = words
+    wanted = stridor(verb, "case.toml", *options, "--quiet", cwd=tmp_path)
+    monkeypatch.setattr(Path, "replace", no_room)
+    done = stridor(verb, "case.toml", *options, "--quiet", "--out", "x", cwd=tmp_path)
+    as_json = stridor(verb, "case.toml", *options, "--json", "--out", "x", cwd=tmp_path)
+    assert wanted.stdout
+    assert done.stdout == wanted.stdout
+    for told in (done, as_json):
+        assert told.returncode == 1
+        assert "stridor: cannot write x/" in told.stderr
+        assert told.stderr.endswith(": No space left on device\n")
+    document = json.loads(as_json.stdout)
+    assert document.get("files", []) == []
+    assert "No space left on device" in document["warnings"][-1]
+
+
 def test_what_is_written_through_a_stream_is_what_was_given(run_file: Path, tmp_path: Path) -> None:
     run = st.open(run_file)
     again = st.open(st.save(run, tmp_path / "again.nc"))

@@ -168,6 +168,13 @@ def large(name: str, form: int, matrix, freedoms, half: bool = False, kind: int 
 FREEDOMS = [(11, 1), (11, 3), (2000, 0)]
 
 
+def test_nastran_matrices_among_other_bulk_data(read):
+    cards = "SOL 111\nBEGIN BULK\nGRID,11,,0.,0.,0.\n" + large("KAAX", 6, SYMMETRIC, FREEDOMS, half=True) + "ENDDATA\n"
+    stored = read("a.bdf", cards)
+    assert stored.matrix.toarray().tolist() == SYMMETRIC.tolist()
+    assert labels(stored) == FREEDOMS
+
+
 def test_nastran_large_fields_of_both_forms(read):
     stored = read("a.pch", large("KAAX", 6, SYMMETRIC, FREEDOMS, half=True))
     assert stored.matrix.toarray().tolist() == SYMMETRIC.tolist()

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 import stridor as st
+from mode_coupling import mode_coupling
 from stridor.modal.parametric import ModesAtPoints
+from stridor.view.modal_plots import root_locus
 from stridor.view.onset_plots import modes_at_points, onset_chart
 
 
@@ -67,3 +69,13 @@ def test_modes_at_points_leave_out_what_a_point_has_not(case: st.Case) -> None:
     assert drawn(figure, "decays") == [(0.1, 0.2), (0.2, 0.11)]
     assert figure.axes[-1].get_xlabel() == "mu"
     assert found.counts() == [2, 1]
+
+
+def test_frequencies_of_order_one_are_not_drawn_in_thousands() -> None:
+    """Models of masses and springs of one, whose numbers may have no unit."""
+    case = mode_coupling()
+    found = st.onsets(case)
+    (ax,) = onset_chart(found).axes
+    assert ax.get_ylabel() == "frequency [Hz]"
+    assert ax.get_ylim()[1] == found.max_frequency_hz < 1e3
+    assert root_locus(st.modes(case, [0.1, 0.2])).axes[0].get_ylabel() == "frequency [Hz]"

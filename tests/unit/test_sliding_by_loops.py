@@ -20,6 +20,7 @@ from stridor.errors import AnalysisError, NotSlidingError
 from stridor.laws import Coulomb, Weakening
 from stridor.sliding import equilibrium, motions, pressing, solution, stretches
 from stridor.sliding.equilibrium import NodeEquilibrium, find_touching, offenders
+from stridor.sliding.motions import placed
 from stridor.sliding.redundant import redundant
 from stridor.sliding.result import SteadySliding
 from stridor.sliding.resultants import balance, resultants
@@ -882,3 +883,12 @@ def test_stretches_in_words() -> None:
     )
     assert "others at μ = 0.5 to 0.9 (no steady sliding). Modes" in elsewhere((none,))[0]
     assert elsewhere((two,))[0].startswith("The nodes that touch at the case's own friction are held")
+
+
+@pytest.mark.parametrize(("said", "wanted"), [
+    ("no contact carries load at μ = 0 (contacts: A)", "no contact carries load at μ = 0 (contacts: A)"),
+    ("it tips over at μ = 0.1; hold it", "it tips over at μ = 0.1; hold it; that is at μ = 0"),
+    ("it tips over", "it tips over; that is at μ = 0"),
+])  # fmt: skip
+def test_the_friction_of_a_message_is_told_once(said: str, wanted: str) -> None:
+    assert placed(AnalysisError(said), 0.0) == wanted

@@ -16,7 +16,19 @@ import stridor as st
 from benches import paper_case
 from matrix_cases import matrix_case
 from program import stridor
-from random_boundaries import disagreement, distance, eigenvalues, growing, off_the_curves, random_islands, random_plane
+from random_boundaries import (
+    CONSTANT,
+    X,
+    Y,
+    disagreement,
+    distance,
+    eigenvalues,
+    growing,
+    off_the_curves,
+    plane,
+    random_islands,
+    random_plane,
+)
 from stridor.io.seals import seal
 from stridor.modal.boundary import Found, Plane, boundaries, march, search
 from stridor.study.boundary_result import Boundary
@@ -103,6 +115,31 @@ def fluttering(tmp_path_factory: pytest.TempPathFactory) -> tuple[st.Case, Bound
     """The boundary of `flutter`, for what changes nothing of it, and what was traced."""
     case = flutter(tmp_path_factory.mktemp("flutter"))
     return case, *traced(case, "x", (-1.0, 2.0), 3.0)
+
+
+@pytest.mark.parametrize(("lean", "gap"), [
+    (0.0, 0.01), pytest.param(0.5, 0.02, marks=pytest.mark.slow), pytest.param(0.5, 3e-3, marks=pytest.mark.slow),
+    (-0.3, 1e-3),
+])  # fmt: skip
+def test_curves_that_all_but_cross_at_one_frequency_are_each_there_once(lean: float, gap: float) -> None:
+    """M = K = I and C symmetric, its determinant (mu − 0.57)(x + l mu − 0.62 − 0.3 l) − gap², in shares of 0.2: growth
+    begins and ends on both branches of that hyperbola, each at ω = 1."""
+    s, x0, y0 = 0.2, 0.62 + 0.3 * lean, 0.57
+    damping = s * np.array([[y0, gap], [gap, x0]])
+    terms = [
+        (EYE, "mass", CONSTANT), (EYE, "stiffness", CONSTANT), (damping, "damping", CONSTANT),
+        (np.diag([-s, -s * lean]), "damping", Y), (np.diag([0.0, -s]), "damping", X),
+    ]  # fmt: skip
+    problem = plane(terms, [(0.0, 1.0), (0.0, 1.0)], 3.0)
+    found = boundaries(problem)
+    first, second = found.curves
+    assert found.agree
+    for curve in (first, second):
+        x, y = curve.points.T
+        np.testing.assert_allclose((y - y0) * (x + lean * y - x0), gap**2, rtol=0.0, atol=1e-12)
+    branches = [np.sign(curve.points[:, 1] - y0) for curve in (first, second)]
+    assert sorted(float(b[0]) for b in branches) == [-1.0, 1.0]
+    assert all(np.all(b == b[0]) for b in branches)
 
 
 def test_growth_begins_where_the_closed_form_says(fluttering: tuple[st.Case, Boundary, Plane, Found]) -> None:

@@ -72,6 +72,21 @@ def assert_same(ours: Trajectory, theirs: Trajectory, *, close: float = 1e-10, s
         assert np.abs(mine - other).max() <= loss * close * size, name
 
 
+def test_what_nothing_disturbs_stays_at_rest() -> None:
+    """Its velocities are 1e-12 m/s, of which a half is larger than the other."""
+    case = paper_case().with_(COARSE).with_({"phases": [{"name": "go", "duration": 2e-3}], "temporal.watch": ["beam1.tip"]})
+    for observable in (None, "A.normal_force"):
+        found = st.ensemble(
+            case, mu=[0.05], perturbation=[0.0, 1e-4], initial="steady-sliding", observable=observable, modes=False
+        )
+        assert found.regime[0] == "still"
+        assert found.regime[1] in ("grows", "decays", "linear")
+        assert np.isnan(found.growth_rate[0])
+        assert np.isnan(found.frequency_hz[0])
+        assert np.isfinite(found.growth_rate[1])
+        assert any(note.startswith("1 member without a perturbation stayed in steady sliding") for note in found.notes)
+
+
 @pytest.mark.parametrize(("beta2", "contact", "every"), [(0.5, "rigid", 7), (0.5, "as given", 50), (0.75, "rigid", 3)])
 def test_each_member_is_the_run_that_it_would_be_alone(beta2, contact, every):
     system = coarse(contacts__A__stiffness=1e7)

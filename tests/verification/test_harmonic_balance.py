@@ -33,6 +33,7 @@ from stridor.periodic.harmonic import (
     defect,
     guessed,
     hill,
+    same_cycle,
     sampled_series,
 )
 from stridor.periodic.harmonic import fourier as fourier_module
@@ -82,6 +83,24 @@ def test_with_more_harmonics_the_cycle_is_that_of_shooting(mu: float, kinds: set
         assert slip < 0.5 / harmonics
     assert period < 2e-4
     assert slip < 3e-3
+
+
+def test_a_cycle_is_one_wherever_it_begins_and_however_it_was_solved():
+    """With stick its series differ by more than 1e-5 with the scales of the law, and with the harmonics."""
+    cycle, family = shot(0.02, 1.4)
+    one = beside(cycle, family, 20)
+    at = one.at
+    later = at.base.real_of(at.base.complex_of(at.z) * np.exp(1j * 1.234 * np.arange(21))[:, None])
+    rubbed = Scales(2.0 * at.scales.push, 3.0 * at.scales.rub)
+    other = balanced(Balanced(evaluated(family, later, at.omega, at.mu, rubbed)))
+    assert abs(other.amplitude / one.amplitude - 1.0) > 1e-5
+    assert same_cycle(one, other)
+    assert same_cycle(other, one)
+    assert same_cycle(one, beside(cycle, family, 13))
+    backwards = Balanced(evaluated(family, at.z * np.repeat([1.0, -1.0], [21, 20]), at.omega, at.mu, at.scales))
+    assert backwards.period == one.period
+    assert backwards.amplitude == one.amplitude
+    assert not same_cycle(one, backwards)  # as often and as much, on another orbit
 
 
 def begun_later(cycle: Cycle, by: int) -> Cycle:

@@ -83,6 +83,7 @@ def test_a_parameter_of_imported_matrices(tmp_path: Path) -> None:
         (("--along", "contact_stiffness", "--between", "2:1"), "--between: '2:1' – low:high, two finite numbers low < high"),
         (("--along", "contact_stiffness", "--between", "1:2", "--range", "0:1"), "--range: is not for onsets along"),
         (("--along", "contact_stiffness", "--between", "1:2", "--undamped"), "--undamped: is not for onsets along"),
+        (("--along", "contact_stiffness", "--between", "1:2", "--undamped"), ": --set bodies.beam1.damping.mass=0 --set "),
         (("--along", "mu", "--between", "0:1", "--range", "0:1"), "--between: '0:1' – is the range of --along"),
     ],
 )

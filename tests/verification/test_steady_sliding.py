@@ -96,6 +96,14 @@ def test_a_body_that_nothing_holds_is_reported():
         steady_sliding(bench(Slave(force=-5.0)))
 
 
+@pytest.mark.parametrize("force", [1e11, 1e20, 1e100])
+def test_loads_beyond_what_the_stiffness_takes_are_told_as_such(force: float):
+    """What holds the beam is there: it is its load that no small displacement answers."""
+    case = paper_case().with_({"loads.press.force": (0.0, -force)})
+    with pytest.raises(AnalysisError, match=r"would move body beam\d by .* m under forces .* check their units"):
+        st.steady_sliding(case)
+
+
 def test_no_sliding_velocity_is_reported():
     with pytest.raises(AnalysisError, match="C0 does not slide"):
         steady_sliding(bench(Slave(), velocity=0.0), mu=0.1)

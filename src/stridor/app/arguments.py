@@ -44,7 +44,8 @@ class Call:
     solver: the one for everything that the program factorises, whatever case and environment say. told: warnings so
     far, each of which is said once; idle: finds settings without effect on what the verb computes, which are told with
     its results, for it may take the model.
-    asked: options that stand for settings of the case, as they were given.
+    asked: options that stand for settings of the case, as they were given. unwritten, lost: files of results that could
+    not be written, and why, which is told behind the results; later: whether it is, or raises at once.
     """
 
     path: Path
@@ -60,6 +61,9 @@ class Call:
     writes: bool = True
     parts: tuple[str, ...] = ()
     stack: ExitStack = field(default_factory=ExitStack)
+    unwritten: list[Path] = field(default_factory=list[Path])
+    lost: list[AnalysisError] = field(default_factory=list[AnalysisError])
+    later: bool = True
 
     def claim(self) -> None:
         """Take the folder for results to oneself until the verb ends, where the verb writes into one. Raises CaseError
@@ -154,15 +158,21 @@ class Call:
 
         self.warn_of_idle()
         own = [w for w in document.get("warnings", ()) if w not in self.told]
-        print_json({**document, "warnings": [*self.told, *own]})
+        lost = [str(error) for error in self.lost]
+        if "files" in document:
+            missing = {str(path) for path in self.unwritten}
+            document = document | {"files": [name for name in document["files"] if name not in missing]}
+        print_json({**document, "warnings": [*self.told, *own, *lost]})
 
     def check_friction(self, mu: float | Iterable[float] | None, where: str = "--mu") -> None:
-        """Refuse friction coefficients asked for that are not finite, warn of unusual ones. Raises CaseError."""
-        from ..case.usual import friction_oddity
+        """Refuse friction coefficients asked for that none can be, warn of unusual ones. Raises CaseError."""
+        from ..case.usual import MOST_FRICTION, TOO_MUCH, friction_oddity
 
         for value in [] if mu is None else [mu] if isinstance(mu, float | int) else mu:
             if not 0.0 <= value < INFINITY:
                 raise CaseError(where, value, "a friction coefficient is a finite number ≥ 0")
+            if value > MOST_FRICTION:
+                raise CaseError(where, value, TOO_MUCH)
             self.warn([friction_oddity(where, value)])
 
     def range_of_friction(self, text: str, where: str = "--range") -> tuple[float, float]:
@@ -219,25 +229,42 @@ class Call:
         words += [str(word) for option in kept if verb in TABLE[option[0]].on for word in option]
         literal(f"Next: {command(words, stdout.page - 6)}")
 
-    def tabulate(self, result: Tabular, name: str) -> Path:
-        """Save a result as a CSV file in the folder, and say so."""
-        from ..io.csv_files import write_csv
-
-        path = write_csv(result, self.folder / name)
-        self.say(f"written: {path}")
+    def write(self, path: Path, write: Callable[[], object]) -> Path:
+        """Write a file of a result, and say so. What cannot be written is told behind the result, which is printed all
+        the same, or (not ``later``) raises AnalysisError at once; behind one that is lost nothing more is written."""
+        if not self.later:
+            write()
+        elif not self.lost:
+            try:
+                write()
+            except AnalysisError as error:
+                self.lost.append(error)
+        if self.lost:
+            self.unwritten.append(path)
+        else:
+            self.say(f"written: {path}")
         return path
 
+    def tabulate(self, result: Tabular, name: str) -> Path:
+        """Save a result as a CSV file in the folder, see `write`."""
+        from ..io.csv_files import write_csv
+
+        path = self.folder / name
+        return self.write(path, lambda: write_csv(result, path))
+
     def draw(self, figure: Figure, name: str) -> Path:
-        """Save a figure in the folder, and say so."""
+        """Save a figure in the folder, see `write`."""
         from ..io.atomic import replacing
         from ..view.style import lay_out
 
         path = self.folder / name
-        lay_out(figure)
-        with replacing(path) as temporary:
-            figure.savefig(temporary, dpi=150)
-        self.say(f"written: {path}")
-        return path
+
+        def drawn() -> None:
+            lay_out(figure)
+            with replacing(path) as temporary:
+                figure.savefig(temporary, dpi=150)
+
+        return self.write(path, drawn)
 
     def withdraw(self, *names: str) -> None:
         """Remove figures from the folder that are none of this result, which an earlier one left; say so."""
@@ -247,16 +274,18 @@ class Call:
                 self.say(f"removed: {path}, of an earlier result; this one has none to draw")
 
     def keep(self, result: Result, name: str) -> Path:
-        """Save a result as a dataset in the folder, and say so."""
+        """Save a result as a dataset in the folder, or where there is room for it, see `write`."""
         from ..io.datasets import save
 
-        try:
-            path = save(result, self.folder / name)
-        except AnalysisError as error:
-            path = self._elsewhere(result, name, error)
-            raise AnalysisError(f"{error}; the result is in {path}") from None
-        self.say(f"written: {path}")
-        return path
+        path = self.folder / name
+
+        def saved() -> None:
+            try:
+                save(result, path)
+            except AnalysisError as error:
+                raise AnalysisError(f"{error}; the result is in {self._elsewhere(result, name, error)}") from None
+
+        return self.write(path, saved)
 
     def _elsewhere(self, result: Result, name: str, error: AnalysisError) -> Path:
         """Save what was computed where there is room for it. Raises the error that there was where there is none."""
@@ -367,7 +396,15 @@ def verb(
                     function(call, **given)  # type: ignore[call-arg]
                 except CaseError as error:
                     raise by_option(error, options, as_given) from error
+                except AnalysisError as error:
+                    call.warn([str(lost) for lost in call.lost if lost is not error])
+                    raise
+                except typer.Exit:
+                    if not call.lost:
+                        raise
             call.warn_of_idle()
+            for lost in call.lost:
+                raise lost
             interrupts.check()
 
         order = (case.replace(annotation=file), *own, *common)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from ..digits import readable
-from ..errors import CaseError
+from ..errors import AnalysisError, CaseError
 from .along import MU, show_onsets_along
 from .arguments import INCOMPLETE, Call, verb
 from .option_table import Band, Branch, MaxFrequency, Mu, Range, Sort, Source, Undamped, Unstable
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 NOT_ALONG = {
     "--range": "their range is that of --between",
-    "--undamped": "they are sought with the damping of the case; set that to zero",
+    "--undamped": "they are sought with the damping of the case; leave it out, and take that damping out of the case",
     "--band": "they are few; --max-frequency is",
     "--source": "they are sought on a reduced model and in the full problem",
 }
@@ -36,7 +37,11 @@ def steady(call: Call, mu: Mu = None) -> None:
 
     found = steady_sliding(work, call.one_friction(mu))
     call.warn(found.warnings)
-    files = write_steady(work, found, call.folder)
+    files = list[Path]()
+    try:
+        files = write_steady(work, found, call.folder)
+    except AnalysisError as error:
+        call.lost.append(error)
     for path in files:
         call.say(f"written: {path}")
     document = steady_document(found) | {"files": [str(f) for f in files]}
@@ -180,7 +185,8 @@ def onsets(
             }
             for option in [option for option, value in given.items() if value]:
                 where = "modal.damped" if option == "--undamped" and not undamped else option
-                raise CaseError(where, None, f"is not for onsets along {name}: {NOT_ALONG[option]}")
+                how = _without_damping(loaded) if option == "--undamped" else ""
+                raise CaseError(where, None, f"is not for onsets along {name}: {NOT_ALONG[option]}{how}")
             _onsets_along(call, loaded, name, None if between is None else range_of(between, "--between"))
             return
 
@@ -233,3 +239,16 @@ def _onsets_along(call: Call, case: Case, name: str, between: tuple[float, float
 
 
 VERBS = {"steady": steady, "shapes": shapes, "modes": modes, "onsets": onsets}
+
+
+def _without_damping(case: Case) -> str:
+    """How the damping of a case is taken out of it, to go on a sentence: an option for each number that gives some."""
+    found: list[str] = []
+    for kind in ("bodies", "springs", "materials"):
+        for name, table in getattr(case, kind).items():
+            given = getattr(table, "damping", None)
+            numbers = {"damping": given} if isinstance(given, float) else vars(given) if given is not None else {}
+            for key, value in numbers.items():
+                at = f"{kind}.{name}.damping" + ("" if key == "damping" else f".{key}")
+                found += [f"--set {at}=0"] if isinstance(value, float) and value > 0.0 else []
+    return f": {' '.join(found)}" if found else ""

@@ -100,6 +100,7 @@ def _finish(call: Call, result: StudyResult, *, draw: bool) -> None:
     """Write the table, the figures and the page; say what came out. Raises AnalysisError for all of them that cannot be
     written, once the others are and what came out is said."""
     written, left = _Written([result.path]), ""
+    call = replace(call, later=False)
     call.say(f"written: {result.path}")
     if draw:
         written.add(lambda: call.tabulate(result, "study.csv"))
@@ -146,6 +147,7 @@ def _draw(call: Call, result: StudyResult, written: _Written) -> str:
         call.say(f"written: {path}")
         return path
 
+    call = replace(call, later=False)
     drawn = study_figures(result)
     for name, figure in drawn.items():
         written.add(partial(call.draw, figure, f"{name}.png"))

@@ -39,6 +39,7 @@ from .schema import (
     Temporal,
     Tie,
 )
+from .usual import MOST_FRICTION, TOO_MUCH
 
 NODE_TOLERANCE = 1e-6  # of an element, so that twelve printed digits still hit a node
 _SIDE_TOLERANCE = 1e-9  # of the slave body's length
@@ -498,11 +499,16 @@ def _setting_problems(parts: SoundTables) -> Iterator[Problem]:
     ):
         if pair is not None and pair[0] >= pair[1]:
             yield Problem(where, pair, "the first number must be below the second")
+        elif pair is not None and pair[1] > MOST_FRICTION:
+            yield Problem(where, pair, TOO_MUCH)
+    if parts.comparison.mu and max(parts.comparison.mu) > MOST_FRICTION:
+        yield Problem("comparison.mu", parts.comparison.mu, TOO_MUCH)
     temporal = parts.temporal
     if temporal.perturbation > 0 and temporal.initial != "steady-sliding":
         yield Problem("temporal.perturbation", temporal.perturbation, 'needs initial = "steady-sliding"')
     if temporal.initial == "steady-sliding" and parts.phases and parts.phases[0].ramp > 0:
-        yield Problem("phases.0.ramp", parts.phases[0].ramp, "0 when starting from steady sliding (temporal.initial)")
+        accepted = "must be 0 when starting from steady sliding (temporal.initial)"
+        yield Problem("phases.0.ramp", parts.phases[0].ramp, accepted)
     for number, reference in enumerate(temporal.watch):
         yield from _point(parts, reference, f"temporal.watch.{number}")
 

@@ -229,6 +229,11 @@ def unusual(table: BaseModel, where: str, *, scaled: bool, area: bool = False) -
                 yield text
 
 
+# The normal n counts in n + μ t by 1/μ: beyond that fewer than ten of its sixteen digits are left.
+MOST_FRICTION = 1e6
+TOO_MUCH = f"a friction coefficient is at most {MOST_FRICTION:g}, beyond which rounding is left of the normal force"
+
+
 def friction_oddity(where: str, mu: float) -> str:
     """What is odd about a friction coefficient that was asked for, "" where nothing is."""
     return _RANGE_OF_MU.oddity(where, mu)

@@ -25,6 +25,7 @@ _BY_SUFFIX = {
     ".npy": "numpy_file",
     ".pch": "nastran_pch",
     ".dmig": "nastran_pch",
+    ".bdf": "nastran_pch",
     ".op4": "nastran_op4",
     ".hb": "harwell_boeing",
     ".rb": "harwell_boeing",
@@ -35,7 +36,7 @@ _BY_SUFFIX = {
     ".mas": "calculix",
 }
 _READ = (
-    ".mtx (Matrix Market, Abaqus; also .mtx.gz), .mat (MATLAB, Ansys), .npz, .npy (NumPy), .pch, .op4 (Nastran), "
+    ".mtx (Matrix Market, Abaqus; also .mtx.gz), .mat (MATLAB, Ansys), .npz, .npy (NumPy), .pch, .bdf, .op4 (Nastran), "
     ".hb, .rb, .rua, .rsa, .matrix (Harwell-Boeing, Ansys), .sti, .mas (CalculiX)"
 )
 

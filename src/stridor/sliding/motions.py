@@ -46,3 +46,9 @@ def words_of_friction(mu: Array) -> str:
     """Friction coefficients (m,) of contacts, as in "μ = 0.3" or "μ = 0.1 … 0.3"."""
     low, high = float(np.min(mu)), float(np.max(mu))
     return f"μ = {low:g}" if f"{low:g}" == f"{high:g}" else f"μ = {low:g} … {high:g}"
+
+
+def placed(error: Exception, mu: float, of: str = "") -> str:
+    """An error with the friction coefficient that it is about, which some name themselves; of: what that is of."""
+    told = str(error)
+    return told if f"at μ = {mu:g} (" in told else f"{told}; that is at μ = {mu:.6g}{of}"

@@ -31,6 +31,7 @@ from .resultants import balance, resultants
 
 ALL_TRIED = 5  # nodes of which it is looked whether other sets are in equilibrium as well
 PRESSED = 1e-12  # of the largest force on a freedom: contact forces no larger are rounding of it
+MECHANISM = 1e12  # of the largest force over the stiffest entry: what moves so far meets no resistance
 ROUNDING = 1e-14  # of the displacement that the largest contact force gives the stiffest freedom
 UNLOADED = 1e-9  # of the largest contact force: what is none
 SIGN_CHANGES = 30
@@ -106,7 +107,7 @@ def steady_sliding(
             raise AnalysisError(twice) from error
         raise
     residual = equilibrium.residual(state)
-    _require_held(system, nodes, state, residual)
+    _require_held(system, nodes, state, residual, force)
     # Where nothing but rigid contact holds the structure, displacements are rounding of its forces.
     rounding = ROUNDING * float(np.abs(state.normal_force).max(initial=0.0)) / equilibrium.scale
     touches = closed(state.active, state.gap, state.displacement, rounding)
@@ -392,11 +393,25 @@ def _moved_most(system: System, size: Array) -> str:
     return system.dof_names[freedom] if freedom < len(system.dof_names) else f"freedom {freedom}"
 
 
-def _require_held(system: System, nodes: ContactNodes, state: NodeEquilibrium, residual: float) -> None:
-    """A mechanism that rounding keeps from being singular shows in displacements beyond any structure's size."""
+def _require_held(
+    system: System, nodes: ContactNodes, state: NodeEquilibrium, residual: float, force: Array
+) -> None:
+    """A mechanism that rounding keeps from being singular shows in displacements beyond any structure's size; so do
+    loads that no structure of these stiffnesses carries, but those in proportion to what stiffness makes of them."""
     extents = [float(np.ptp(line.coordinates, axis=0).max()) for line in system.lines]
     extents += [float(np.ptp(solid.points, axis=0).max()) for solid in system.solids]
     # Point masses alone have no size.
     limit = 1e6 * max(extents) if max(extents, default=0.0) > 0 else 1e12
-    if residual > 1e-8 or float(np.abs(state.displacement).max(initial=0.0)) > limit:
-        raise AnalysisError(_loose(system, nodes, state.displacement))
+    farthest = float(np.abs(state.displacement).max(initial=0.0))
+    if residual <= 1e-8 and farthest <= limit:
+        return
+    largest = max(float(np.abs(of).max(initial=0.0)) for of in (force, state.normal_force))
+    stiffest = float(np.abs(system.stiffness.data).max(initial=0.0))
+    if farthest > limit and farthest * stiffest < MECHANISM * largest:
+        raise AnalysisError(
+            f"steady sliding would move {_moved_most(system, np.abs(state.displacement))} by {farthest:.3g} m under "
+            f"forces of up to {largest:.3g} N: loads, interference or gaps are beyond what the stiffness takes in "
+            "small displacements; check their units and digits"
+        )
+    raise AnalysisError(_loose(system, nodes, state.displacement))
+

@@ -17,6 +17,7 @@ from ..errors import AnalysisError, NotSlidingError
 from ..system import System
 from ..typing import Array, BoolArray
 from .equilibrium import FEW
+from .motions import placed
 from .pressing import anything_acts
 from .solution import ALL_TRIED, STEADY, SteadySliding, other_equilibria, steady_nodes, steady_sliding
 
@@ -288,7 +289,7 @@ class _Equilibria:
         except NotSlidingError:
             raise
         except AnalysisError as error:
-            return _Look(mu, None, None, f"{error}; that is at μ = {mu:.6g}")
+            return _Look(mu, None, None, placed(error, mu))
         return _Look(mu, _key(found), found)
 
     def _solved(self, mu: float | None) -> SteadySliding:

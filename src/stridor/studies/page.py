@@ -15,6 +15,7 @@ from ..view.tables import Table, TableRow
 from .result import StudyResult
 from .summary import Line, answer, failures, tables
 from .tables import Varied
+from .uncertainty import COVERS
 
 # Titles of figures, and what is to be seen in them.
 _FIGURES = {
@@ -43,7 +44,9 @@ _FIGURES = {
     "maps": ("Over two parameters", "A mark for each sample; nothing is interpolated between samples."),
     "root-locus": ("Modes of all samples", "Growth rate over frequency: above the line a mode grows."),
     "bands": ("How likely a mode grows, by frequency", "With intervals of 95 %."),
-    "sobol-indices": ("What decides it", "Shares of the variance: of a number alone, and together with others."),
+    "sobol-indices": (
+        "What decides it", f"Shares of the variance: of a number alone, and together with others; {COVERS}.",
+    ),
 }
 _OVER = "over-"
 

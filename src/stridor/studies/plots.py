@@ -134,7 +134,7 @@ def _beyond(result: StudyResult, ax: Axes, at: Array, critical: Array) -> list[A
 
 @styled
 def tornado(indices: Indices, *, ax: Axes | None = None) -> Figure:
-    """Sobol indices, the most important parameter on top: first order and total, with their 95 % intervals."""
+    """Sobol indices, the most important parameter on top: first order and total, with their half-widths."""
     order = np.argsort(indices.total)
     figure, ax = panel(ax, 1.2 + 0.5 * len(order))
     for shift, values, widths, colour, label in (

@@ -12,6 +12,7 @@ from ..digits import measured
 from ..errors import AnalysisError
 from ..notebook import counted
 from .result import StudyResult, numbers
+from .uncertainty import COVERS
 
 Line = Sequence[str]
 Listing = tuple[str, Line, Sequence[Line]]
@@ -105,7 +106,7 @@ def _indices(result: StudyResult) -> list[Listing]:
         for k in order
     ]
     note = f" ({indices.note})" if indices.note else ""
-    return [(f"Sobol indices of {indices.of}{note}", ("parameter", "first order", "total"), rows)]
+    return [(f"Sobol indices of {indices.of}{note}; {COVERS}", ("parameter", "first order", "total"), rows)]
 
 
 def _spread(result: StudyResult, name: str) -> Line | None:

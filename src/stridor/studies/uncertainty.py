@@ -17,6 +17,9 @@ from ..typing import Array, BoolArray
 from .sampling import salib
 
 RESAMPLES = 200  # of the intervals of Sobol indices
+# Points of a scrambled Sobol sequence are not independent, and resampling knows neither that nor a rare large value
+# that is not among them: between 80 % and all of the intervals of known functions hold the truth, not 95 %.
+COVERS = "± by resampling, too narrow at times: studies with other seeds tell"
 
 
 @dataclass(frozen=True)
@@ -88,8 +91,13 @@ def _score(confidence: float) -> float:
 
 @dataclass(frozen=True)
 class Indices:
-    """Sobol indices of a result: first order (p,) and total (p,), half the 95 % intervals of both, and what was left
-    out or put in the place of what is missing."""
+    """Sobol indices of a result: first order (p,) and total (p,), half-widths of both by resampling, and what was left
+    out or put in the place of what is missing.
+
+    The half-widths are 1.96 standard deviations over resampled points, as if these were independent. With 64 to 512
+    samples of functions whose indices are known, intervals held the truth in 80 to 100 % of the seeds, depending on the
+    function and the index (Ishigami's: 84 to 100 %); indices over several seeds tell how far they scatter.
+    """
 
     of: str
     names: tuple[str, ...]

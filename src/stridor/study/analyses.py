@@ -264,6 +264,7 @@ def onsets(
     work = Workspace.of(problem)
     given = work.modal.friction_range if friction_range is None else friction_range
     between = require_range(given, "friction_range", least=0.0)
+    require_friction(between[1], "friction_range")
     limit = max_frequency_hz or work.modal.max_frequency_hz
     require_band(band_hz, limit)
     damped = work.modal.damped if damped is None else damped

@@ -7,12 +7,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, cast
 
 from ..asking import is_number
+from ..case.usual import MOST_FRICTION, TOO_MUCH
 from ..errors import CaseError
 
 
 def require_friction(mus: float | Iterable[float] | None, where: str = "mu", *, several: bool = True) -> Any:
-    """Refuse friction coefficients that are none: negative, not finite, text, an empty list, a list where ``several``
-    is false. Gives them back, as a list what can be gone through once only. Raises CaseError."""
+    """Refuse friction coefficients that are none: negative, not finite, too large, text, an empty list, a list where
+    ``several`` is false. Gives them back, as a list what can be gone through once only. Raises CaseError."""
     given: Any = mus
     if several and isinstance(given, Iterable) and not isinstance(given, str | Mapping | Sequence):
         given = given if hasattr(given, "ndim") else list(cast("Iterable[Any]", given))
@@ -25,6 +26,8 @@ def require_friction(mus: float | Iterable[float] | None, where: str = "mu", *, 
         value = value.item() if getattr(value, "ndim", None) == 0 else value  # an array of one number is one
         if not is_number(value) or not 0.0 <= value < math.inf:
             raise CaseError(where, value, "a friction coefficient is a finite number ≥ 0")
+        if value > MOST_FRICTION:
+            raise CaseError(where, value, TOO_MUCH)
     return given
 
 

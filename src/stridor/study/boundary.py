@@ -20,7 +20,7 @@ from ..modal.boundary import Found, StabilityCurve, boundaries
 from ..modal.parametric import ReducedModel
 from ..threads import one_thread
 from ..typing import IntArray
-from .asked import require_range
+from .asked import require_friction, require_range
 from .boundary_again import position_error, solved_again
 from .boundary_problem import BoundaryAsked, Method, plane_of, solved_problem
 from .boundary_result import Boundary, BoundaryCurve, CountedAt
@@ -66,6 +66,9 @@ def stability_boundary(
     work = Workspace.of(problem)
     case = work.case("a stability boundary")
     ends = require_range(x_range, "x_range"), require_range(y_range, "y_range")
+    for path, (_, high), where in zip((x, y), ends, ("x_range", "y_range"), strict=True):
+        if path == MU and high > 0.0:
+            require_friction(high, where)
     asked = BoundaryAsked((x, y), ends, method, bound, tolerance, lines)
     asked.check(case)
     top = case.modal.max_frequency_hz if max_frequency_hz is None else float(max_frequency_hz)

@@ -40,7 +40,6 @@ PUSHES = (1.0, 3.0)  # of the slip speed
 HARMONICS = 7  # to begin with, where the defect is to decide
 MOST_HARMONICS = 48
 DEFECT = 1e-3  # beyond which there are more
-ALIKE = 1e-5  # of period and amplitude
 BEYOND = 1.3  # times the onset or the μ: how far a branch is followed for cycles at a μ
 SECONDS = 60.0  # for a motion
 
@@ -280,9 +279,5 @@ class Harmonic:
         return kept.at(mu)
 
     def same(self, one: series.Balanced, other: series.Balanced) -> bool:
-        """By period and amplitude: series of different harmonics are the same as far as these go."""
-        finer = min(one.harmonics, other.harmonics)
-        near = ALIKE if one.harmonics == other.harmonics else 1.0 / finer**2
-        return abs(one.period - other.period) <= near * one.period and (
-            abs(one.amplitude - other.amplitude) <= near * one.amplitude
-        )
+        """By their orbits, wherever the period begins."""
+        return series.same_cycle(one, other)

@@ -99,6 +99,7 @@ def cycles(
         low, high = (float(v) for v in between)
         if not (np.isfinite(low) and np.isfinite(high) and 0.0 <= low < high):
             raise CaseError("between", between, "two finite friction coefficients 0 ≤ low < high")
+        require_friction(high, "between")
         between = low, high
     search = _CycleSearch(work, between, chosen, harmonics, pushes, points, seconds, runs, progress, keep, started)
     try:

@@ -16,6 +16,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from ..asking import FUNCTION, NUMBER, NUMBERS, PAIR, TEXT, takes
+from ..case.usual import MOST_FRICTION, TOO_MUCH
 from ..errors import AnalysisError, CaseError
 from ..modal.source import by_receptance
 from ..typing import Array
@@ -74,6 +75,8 @@ def damping_map(
     if method not in get_args(Method):
         raise CaseError("method", method, f"one of {', '.join(get_args(Method))}")
     low, high = case.modal.friction_range if mu_range is None else mu_range
+    if high > MOST_FRICTION:
+        raise CaseError("mu_range", mu_range, TOO_MUCH)
     top = case.modal.max_frequency_hz if max_frequency_hz is None else max_frequency_hz
     xs, ys = _values(x_range, grid[0], "x_range"), _values(y_range, grid[1], "y_range")
     if len(xs) * len(ys) > MOST_POINTS:

@@ -14,6 +14,7 @@ from ..asking import FUNCTION, NUMBER, NUMBERS, SWITCH, TEXT, takes
 from ..case.fields import MOST
 from ..errors import CaseError
 from ..modal.painleve import steps_undetermined
+from ..notebook import counted
 from ..sliding import full_motion
 from ..system import System
 from ..temporal.ensembles import EnsembleOutcome, march_all
@@ -23,7 +24,7 @@ from ..temporal.simulate import Progress, step_of
 from ..temporal.trajectory import Trajectory
 from ..typing import Array, IntArray
 from .analyses import check_extent
-from .asked import require_choice, require_count
+from .asked import require_choice, require_count, require_friction
 from .ensemble_modes import UnstableMap, unstable_modes
 from .ensemble_numbers import LEAST_RECORDS, MemberNumbers, Observable, last_phase, numbers_of, observable_of
 from .ensemble_result import AXES, Ensemble
@@ -31,6 +32,8 @@ from .pressed import require_pressed_in_time
 from .provenance import provenance
 from .settings import phases_of, settings_of
 from .workspace import Problem, Workspace
+
+UNSEEN = "what vibrates is rounding, and whether they would grow it does not say; give a perturbation to see it"
 
 Values = float | Sequence[float] | Array | None
 Sweep = Literal["up", "down", "both"]
@@ -96,7 +99,7 @@ def ensemble(
     looked_at = observable_of(observable, system, settings)
     _check_window(work, system, settings, window)
     watch = settings.watch if records else (looked_at.owner,) if looked_at.of_point else ()
-    seen = _Seen(looked_at, work.modal.max_frequency_hz, plan, records)
+    seen = _Seen(looked_at, work.modal.max_frequency_hz, plan, records, settings.initial == "steady-sliding")
     outcome = march_all(
         system, phases_of(work), replace(settings, watch=watch), plan.tracks, seen.see, window=window, cores=cores,
         progress=progress, separately=separately, device=device,
@@ -146,6 +149,8 @@ def _values(
         if array.max() > MOST:  # as of every number of a case
             raise CaseError(name, float(array.max()), f"numbers up to {MOST:g}")
         made[name] = array
+    if mu is not None:
+        require_friction(float(made["mu"].max()))
     return made
 
 
@@ -217,7 +222,10 @@ def _member(row: Array) -> Member:
 class _Seen:
     """Takes runs as they are finished, from any thread, and keeps their numbers."""
 
-    def __init__(self, observable: Observable, max_frequency_hz: float, plan: _Plan, records: bool) -> None:
+    def __init__(
+        self, observable: Observable, max_frequency_hz: float, plan: _Plan, records: bool, begun_in_sliding: bool
+    ) -> None:
+        self.begun_in_sliding = begun_in_sliding
         self.observable, self.max_frequency_hz, self.plan, self.records = observable, max_frequency_hz, plan, records
         self.numbers: dict[int, MemberNumbers] = {}
         self.errors: dict[int, str] = {}
@@ -229,7 +237,8 @@ class _Seen:
         if isinstance(run, str):
             self.errors[row] = run
             return
-        self.numbers[row] = numbers_of(run, self.observable, self.max_frequency_hz)
+        disturbed = not self.begun_in_sliding or leg > 0 or bool(self.plan.rows[row, 3] != 0.0)
+        self.numbers[row] = numbers_of(run, self.observable, self.max_frequency_hz, disturbed=disturbed)
         if self.records:
             self.runs[row] = last_phase(run)
 
@@ -267,6 +276,9 @@ def _result(
     sliding = np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1).max(initial=0.0)
     end = sum(p.duration for p in work.phases)
     given = () if np.isnan(plan.rows[:, 0]).all() else work.one_for_all
+    rest = [k for k, name in enumerate(regime) if name == "still" and seen.begun_in_sliding and not plan.rows[k, 3]]
+    if rest:
+        given = (*given, f"{counted(len(rest), 'member')} without a perturbation stayed in steady sliding: {UNSEEN}")
     return Ensemble(
         mu=plan.rows[:, 0], load=plan.rows[:, 1], speed=plan.rows[:, 2], perturbation=plan.rows[:, 3],
         sweep=plan.sweep, slip_speed=plan.rows[:, 2] * float(sliding), observable=seen.observable.name,

@@ -21,6 +21,7 @@ OF_CONTACT = {"slip_speed": "m/s", "normal_force": "N", "tangential_force": "N",
 STEADY = 1.1  # by how much the amplitudes of both halves of the window may differ where it is steady
 LEAST_RECORDS = 64  # of a window
 ROUNDING = 1e-12  # of the largest value: what no longer vibrates
+UNTOUCHED = 1e-6  # of the slip speed: below that a motion that nothing has disturbed is rounding
 
 
 @dataclass(frozen=True)
@@ -91,9 +92,12 @@ class MemberNumbers:
     contacts: Mapping[str, ContactStatistics]
 
 
-def numbers_of(run: Trajectory, observable: Observable, max_frequency_hz: float) -> MemberNumbers:
+def numbers_of(
+    run: Trajectory, observable: Observable, max_frequency_hz: float, *, disturbed: bool = True
+) -> MemberNumbers:
     """The window of a run, its last phase, in numbers; the frequency by way of the phase before it, whose end the
-    filter takes up."""
+    filter takes up. disturbed: whether anything brought it out of steady sliding; of rounding neither rate nor
+    frequency is told."""
     window = run.phase_slice()
     signals = observable.signals(run)
     seen = signals[window]
@@ -106,6 +110,8 @@ def numbers_of(run: Trajectory, observable: Observable, max_frequency_hz: float)
     rate = math.log(after / before) / duration if before > 0.0 and after > 0.0 else math.nan
     contacts = run.phases[-1].contacts
     still = max(before, after) <= ROUNDING * float(np.abs(seen).max())
+    if not disturbed and _rests(run, window):
+        return MemberNumbers(rms, peak, math.nan, math.nan, "still", contacts)
     regime = "still" if still else _regime(before, after, contacts.values())
     loudest = int(np.argmax(np.ptp(seen, axis=0)))
     start = run.phase_slice(-2).start if len(run.phases) > 1 else window.start
@@ -113,6 +119,15 @@ def numbers_of(run: Trajectory, observable: Observable, max_frequency_hz: float)
     filtered = low_passed(signals[start : window.stop, loudest], run.sampling, max_frequency_hz)
     frequency, amplitude = spectrum_of_end(filtered, run.sampling, share).line()
     return MemberNumbers(rms, peak, frequency if amplitude > 0.0 else math.nan, rate, regime, contacts)
+
+
+def _rests(run: Trajectory, window: slice) -> bool:
+    """Whether no contact changes its state in a window (of records), nor its slip speed by more than rounding."""
+    slip = run.slip_speed[window]
+    changes = float(np.ptp(slip, axis=0).max(initial=0.0))
+    return all(map(_one_state, run.phases[-1].contacts.values())) and changes <= UNTOUCHED * float(
+        np.abs(slip).max(initial=0.0)
+    )
 
 
 def _one_state(contact: ContactStatistics) -> bool:

@@ -66,7 +66,8 @@ class Ensemble(Tabular):
     (k,) [1/s] of the rms from one half of it to the other. regime (k,), by these halves: "steady" where contacts
     change between stick, slip and separation and the rms of both is the same within 10 %, "transient" where it is not.
     Without such changes contacts that slip leave the motion linear: it "grows" or "decays" by more than that, or is
-    "linear"; "sticks" where none slips, "still" where nothing vibrates; "failed" (error says why) or "interrupted".
+    "linear"; "sticks" where none slips, "still" where nothing vibrates, or nothing has disturbed steady
+    sliding and what is left is rounding (growth_rate, frequency_hz: NaN); "failed" (error says why) or "interrupted".
 
     mode (k,): number, as in `modes`, of the unstable mode that responds, the nearest one to the frequency if it is
     within 5 % of it, else 0; mode_hz, mode_deviation (k,): frequency of the nearest and how far off the run is,

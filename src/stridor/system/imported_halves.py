@@ -29,6 +29,7 @@ _MARKS = {
     ".gz": 'say "symmetric" in place of "general" in its first line',
     ".op4": "write it as form 6",
     ".pch": "write it as form 6",
+    ".bdf": "write it as form 6",
     ".dmig": "write it as form 6",
     ".hb": "write it as RSA",
     ".rb": "write it as rsa",

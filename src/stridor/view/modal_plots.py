@@ -17,7 +17,7 @@ from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onset, Onsets
 from ..typing import Array, BoolArray
 from .colours import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION
-from .style import legend_above, panel, root_figure, styled, zero_line
+from .style import frequency_unit, legend_above, panel, root_figure, styled, zero_line
 
 LINES = (BLUE, GREEN, PURPLE, SKY, ORANGE)  # vermilion is kept for what is unstable
 MU = "friction coefficient μ"
@@ -36,14 +36,17 @@ def root_locus(modes: ComplexModes, *, max_frequency_hz: float | None = None, ax
     scatter = None
     # One scale for all: scatter leaves out what is NaN and would scale each branch by the μ at which it is listed.
     norm = Normalize(float(modes.mu.min()), float(modes.mu.max()))
+    unit, its_name = frequency_unit(top)
     for b in range(len(modes.branch)):
-        growth, frequency = modes.growth_rate[:, b], modes.frequency_hz[:, b] / 1e3
+        growth, frequency = modes.growth_rate[:, b], modes.frequency_hz[:, b] / unit
         ax.plot(growth, frequency, color="#BBBBBB", linewidth=0.8, zorder=2)
         scatter = ax.scatter(
             growth, frequency, c=modes.mu, norm=norm, cmap="viridis", s=9, zorder=3, linewidths=0, rasterized=True
         )
     ax.axvline(0.0, color=INK, linewidth=0.8, zorder=1.5)
-    ax.set(xlabel="growth rate Re λ [1/s]   (right of 0: grows)", ylabel="frequency [kHz]", ylim=(0, top / 1e3))
+    ax.set(
+        xlabel="growth rate Re λ [1/s]   (right of 0: grows)", ylabel=f"frequency [{its_name}]", ylim=(0, top / unit)
+    )
     shown = modes.frequency_hz <= top
     reach = 1.05 * float(np.abs(modes.growth_rate[shown]).max(initial=1.0))
     # Growth spans decades between modes; the middle stays linear, so that the axis itself is seen crossed.
@@ -71,7 +74,7 @@ def frequency_branches(
     _require_modes(modes)
     columns = _columns(modes, branches)
     figure, ax = panel(ax, 3.5 if len(columns) <= FEW else 5.2)
-    scale, unit = (1.0, "Hz") if len(columns) <= FEW else (1e3, "kHz")
+    scale, unit = (1.0, "Hz") if len(columns) <= FEW else frequency_unit(_top(modes, max_frequency_hz))
     few = len(columns) <= FEW
     for index, b in enumerate(columns):
         values, unstable = modes.frequency_hz[:, b] / scale, modes.unstable[:, b]

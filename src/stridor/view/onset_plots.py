@@ -12,7 +12,7 @@ from ..modal.onsets import Onsets
 from ..modal.parametric import ModesAtPoints
 from .colours import BLUE, GREY, INK, VERMILION
 from .modal_plots import MU
-from .style import legend_above, panel, stacked, styled, zero_line
+from .style import frequency_unit, legend_above, panel, stacked, styled, zero_line
 
 MOST_NAMED = 12  # onsets with their value beside them
 
@@ -28,25 +28,26 @@ def onset_chart(onsets: Onsets | ParametricOnsets, *, ax: Axes | None = None) ->
     else:
         (low, high), name, at = onsets.between, onsets.parameter, [o.value for o in onsets]
         ends = ()
+    unit, its_name = frequency_unit(onsets.max_frequency_hz)
     for words, ending, colour in (("growth begins", False, VERMILION), ("growth ends", True, "white")):
-        chosen = [(x, o.frequency_hz / 1e3) for x, o in zip(at, onsets, strict=True) if o.stabilising is ending]
+        chosen = [(x, o.frequency_hz / unit) for x, o in zip(at, onsets, strict=True) if o.stabilising is ending]
         if chosen:
             ax.plot(*zip(*chosen, strict=True), "D", color=colour, mec=VERMILION, ms=6, label=words, clip_on=False)
     for end, marker, values in ends:
         if values:
             side = "start" if end == low else "end"
             label = f"grows at the {side} of the range"
-            kilohertz = [abs(v.imag) / (2e3 * np.pi) for v in values]
-            ax.plot([end] * len(values), kilohertz, marker, color=INK, ms=6, ls="none", label=label, clip_on=False)
+            there = [abs(v.imag) / (2 * np.pi * unit) for v in values]
+            ax.plot([end] * len(values), there, marker, color=INK, ms=6, ls="none", label=label, clip_on=False)
     # Once where several begin or end together, as at a value from which on other nodes touch.
     highest = {x: o for x, o in sorted(zip(at, onsets, strict=True), key=lambda one: one[1].frequency_hz)}
     for x, o in sorted(highest.items(), key=lambda one: one[0])[:MOST_NAMED]:
         right = x < (low + high) / 2
         ax.annotate(
-            measured(x, 4), (x, o.frequency_hz / 1e3), xytext=(7 if right else -7, 0), textcoords="offset points",
+            measured(x, 4), (x, o.frequency_hz / unit), xytext=(7 if right else -7, 0), textcoords="offset points",
             ha="left" if right else "right", va="center", fontsize=8,
         )  # fmt: skip
-    ax.set(xlim=(low, high), ylim=(0, onsets.max_frequency_hz / 1e3), xlabel=name, ylabel="frequency [kHz]")
+    ax.set(xlim=(low, high), ylim=(0, onsets.max_frequency_hz / unit), xlabel=name, ylabel=f"frequency [{its_name}]")
     if not len(onsets):
         ax.text(0.5, 0.5, "no onset found", transform=ax.transAxes, ha="center", va="center", color=GREY)
     # Four that long do not stand beside each other, and what is too wide takes its width from the frame.

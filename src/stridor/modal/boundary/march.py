@@ -7,6 +7,7 @@ one is off the cubic between its neighbours by more than the tolerance, both hal
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -19,6 +20,7 @@ from .plane import Plane
 from .spot import CurvePoint, point_on
 
 LONGEST, SHORTEST = 0.15, 1e-6  # steps, in shares of the ranges
+CLOSELY = 0.01  # the longest where curves all but cross by less than the tolerance
 FIRST = 0.02
 TURN = 0.45  # [rad] a step may turn the tangent by
 AIMED = 0.3  # and is meant to
@@ -29,21 +31,79 @@ STILL = 1e-3  # of the ranges: flutter that comes to rest nearer than that, and 
 MOST = 3000  # points
 LONG = 0.05  # pieces longer than that are halved in any case
 EVENLY = 0.02  # of its change: how far off ω may be in the middle of two points
+CLOSER = (1.0, 0.1, 0.01)  # of the tolerance: how far off the middle of a step may be, where one of a curve was
+ROW, ROW_OMEGA = 5, 1e-3  # points in a row, and of ω there: curves that run along one another
 LEVELS = 6  # halvings in the middle of two points
 BESIDE = 0.5  # of a step: how far a point is looked for
 INSIDE = 1e-12
 CUSP = 1e-4  # how far from one another curves may end that end in one cusp
 
 
-def traced(plane: Plane, seed: CurvePoint, tolerance: float) -> StabilityCurve:
-    """The curve through a point, both ways until it leaves the rectangle or the band, or comes back."""
-    forward, end, closed = _march(plane, seed, 1)
+def traced(plane: Plane, seed: CurvePoint, tolerance: float, closely: bool = False) -> StabilityCurve:
+    """The curve through a point, both ways until it leaves the rectangle or the band, or comes back.
+
+    Where two curves of one frequency all but cross, a long step may end on the other one. Then there is no point in the
+    middle of it, or one that is off; the curve is followed once more, by steps that have one each, and by finer ones
+    where that does not do. closely: by the finest ones, where a jump within the tolerance matters.
+    """
+    if closely:
+        return _both_ways(plane, seed, tolerance, CLOSER[-1] * tolerance, CLOSELY)
+    curve = _both_ways(plane, seed, tolerance, None)
+    for share in CLOSER:
+        if not curve.unchecked:
+            break
+        again = _both_ways(plane, seed, tolerance, share * tolerance)
+        curve = again if again.unchecked < curve.unchecked else curve
+    return curve
+
+
+def _both_ways(
+    plane: Plane, seed: CurvePoint, tolerance: float, halfway: float | None, longest: float = LONGEST
+) -> StabilityCurve:
+    forward, end, closed = _march(plane, seed, 1, halfway, longest)
     backward: list[CurvePoint] = []
     start = end
     if not closed:
-        backward, start, _ = _march(plane, seed, -1)
+        backward, start, _ = _march(plane, seed, -1, halfway, longest)
     spots = [*reversed(backward), seed, *forward]
     return refined(plane, StabilityCurve(tuple(spots), closed, (start, end)), tolerance)
+
+
+def apart(plane: Plane, one: StabilityCurve, other: StabilityCurve, tolerance: float) -> tuple[StabilityCurve, ...]:
+    """Two curves followed once more where they run along one another: at a place where both all but cross one of them
+    has jumped, by less than the tolerance perhaps, and the other one has not. As they are where they still do, as
+    those of modes that a system has twice."""
+    if not _along(one, other, tolerance):
+        return one, other
+    first = traced(plane, one.spots[len(one.spots) // 2], tolerance, closely=True)
+    rest = max((*one.spots, *other.spots), key=lambda spot: _off(spot, first))
+    second = traced(plane, rest, tolerance, closely=True)
+    return (one, other) if _along(first, second, tolerance) else (first, second)
+
+
+def _along(one: StabilityCurve, other: StabilityCurve, tolerance: float) -> bool:
+    """Whether several points of one in a row lie on the other, with its frequency; both cross in one or two."""
+    if one.kind != other.kind:
+        return False
+    row = 0
+    for spot in one.spots:
+        row = row + 1 if _off(spot, other) <= tolerance else 0
+        if row == ROW:
+            return True
+    return False
+
+
+def _off(spot: CurvePoint, curve: StabilityCurve) -> float:
+    """How far a point is off a curve; infinite where the curve has another frequency there."""
+    ways = curve.drawn.points - spot.p
+    ends, pieces = ways[:-1], np.diff(curve.drawn.points, axis=0)
+    if not len(pieces):
+        return math.inf
+    shares = np.clip(-np.sum(ends * pieces, axis=1) / np.maximum(np.sum(pieces**2, axis=1), 1e-300), 0.0, 1.0)
+    off = np.hypot(*(ends + shares[:, None] * pieces).T)
+    k = int(np.argmin(off))
+    omega = curve.drawn.omega[k] + shares[k] * (curve.drawn.omega[k + 1] - curve.drawn.omega[k])
+    return float(off[k]) if abs(omega - spot.omega) <= ROW_OMEGA * max(omega, spot.omega) else math.inf
 
 
 def joined(curves: Sequence[StabilityCurve]) -> list[StabilityCurve]:
@@ -85,14 +145,18 @@ class _MarchState:
     step: float
 
 
-def _march(plane: Plane, seed: CurvePoint, sense: int) -> tuple[list[CurvePoint], str, bool]:
-    """Points after the first one, how it ends, and whether it came back."""
+def _march(
+    plane: Plane, seed: CurvePoint, sense: int, halfway: float | None, longest: float
+) -> tuple[list[CurvePoint], str, bool]:
+    """Points after the first one, how it ends, and whether it came back. halfway: how far off the point in the middle
+    of every step may be, in shares of the ranges; None where none is looked for. longest: step."""
     way = _MarchState(seed, sense * seed.tangent, 0.0, FIRST)
     start, gone, found = way.heading, 0.0, list[CurvePoint]()
     while len(found) < MOST:
         if _leaving(way):
             return found, "edge", False
-        new = _next(plane, way)
+        way.step = min(way.step, longest)
+        new = _next(plane, way, halfway)
         if new is None:
             return found, "zero frequency" if _stops(plane, way) else "lost", False
         if gone and _back(way, new, seed, start):
@@ -141,11 +205,11 @@ def _on(way: _MarchState, new: CurvePoint) -> _MarchState:
     return _MarchState(new, heading, turn / length if length else 0.0, step)
 
 
-def _next(plane: Plane, way: _MarchState) -> CurvePoint | None:
+def _next(plane: Plane, way: _MarchState, halfway: float | None) -> CurvePoint | None:
     """The next point; None where no step, however short, leads to one."""
     while way.step >= SHORTEST:
         new = _tried(plane, way)
-        if new is not None and _follows(plane, way, new):
+        if new is not None and _follows(plane, way, new) and (halfway is None or _passes(plane, way, new, halfway)):
             return new
         way.step *= 0.5
     return None
@@ -256,13 +320,9 @@ def _between(
         return [], 0.0, 0
     # At a standstill growth changes sides where flutter ends on it, which is to be known as well as the curve.
     flips = (old.tangent @ heading) * (new.tangent @ heading_to) < 0
-    (middle,) = hermite(old.p, heading, new.p, heading_to, np.array([0.5]))
-    across = _rotated(new.p - old.p, 0.5 * np.pi) / length
-    chord = plane.chord(middle, across, (-0.3 * length, 0.3 * length))
-    spot = point_on(plane, old.kind, chord, 0.5 * (old.omega + new.omega), old.right, old.left)
-    if spot is None or not _like(plane, old, spot):
+    spot, off = _halfway(plane, one, other)
+    if spot is None:
         return [], 0.0, int(length > tolerance)
-    off = float(np.hypot(*(spot.p - middle)))
     smooth = off <= tolerance and length <= LONG and _even(old, spot, new, heading, heading_to)
     if (smooth and not flips) or levels <= (-LEVELS if flips else 0):
         return [spot], off, int(off > tolerance)
@@ -270,6 +330,31 @@ def _between(
     first, one_off, lost = _between(plane, one, (spot, ahead), tolerance, levels - 1)
     last, other_off, lost_too = _between(plane, (spot, ahead), other, tolerance, levels - 1)
     return [*first, spot, *last], max(one_off, other_off), lost + lost_too
+
+
+def _halfway(
+    plane: Plane, one: tuple[CurvePoint, Array], other: tuple[CurvePoint, Array]
+) -> tuple[CurvePoint | None, float]:
+    """The point in the middle of two points with their headings, and how far it is off the cubic between them; None
+    where there is none of the first one's eigenpair."""
+    (old, heading), (new, heading_to) = one, other
+    length = float(np.hypot(*(new.p - old.p)))
+    (middle,) = hermite(old.p, heading, new.p, heading_to, np.array([0.5]))
+    across = _rotated(new.p - old.p, 0.5 * np.pi) / length
+    chord = plane.chord(middle, across, (-0.3 * length, 0.3 * length))
+    spot = point_on(plane, old.kind, chord, 0.5 * (old.omega + new.omega), old.right, old.left)
+    if spot is None or not _like(plane, old, spot):
+        return None, 0.0
+    return spot, float(np.hypot(*(spot.p - middle)))
+
+
+def _passes(plane: Plane, way: _MarchState, new: CurvePoint, halfway: float) -> bool:
+    """Whether the curve has a point in the middle of a step, near the cubic between its ends, ω included."""
+    ahead = new.tangent if new.tangent @ way.heading >= 0 else -new.tangent
+    if float(np.hypot(*(new.p - way.spot.p))) <= halfway:
+        return True  # no longer than what a piece may be off
+    spot, off = _halfway(plane, (way.spot, way.heading), (new, ahead))
+    return spot is not None and off <= halfway and _even(way.spot, spot, new, way.heading, ahead)
 
 
 def _even(old: CurvePoint, middle: CurvePoint, new: CurvePoint, heading: Array, heading_to: Array) -> bool:

@@ -22,7 +22,7 @@ from ..onset import Onset
 from ..tolerances import UNSTABLE_RELATIVE
 from .climb import ModesAtPoint, climb, tops
 from .curve import Crossing, Drawn, StabilityCurve, crossings
-from .march import joined, traced, without_points
+from .march import apart, joined, traced, without_points
 from .passing import FINEST, refined
 from .plane import Count, Plane
 from .spot import CurvePoint, Kind, point_on
@@ -182,10 +182,16 @@ class _CurveSearch:
             if not _pairs(line, crossings(self.found.drawn, *line.ends), self.tolerance, only=onset.mu):
                 seed = self._seed(line, onset)
                 if seed is not None:
-                    self.found.curves.append(traced(self.plane, seed, self.tolerance))
+                    self._add(traced(self.plane, seed, self.tolerance))
         self._done += 1
         if self._progress is not None:
             self._progress(self._done, max(2 * self.number, self._done))
+
+    def _add(self, new: StabilityCurve) -> None:
+        """Keep a curve; what runs along another one is followed anew with that."""
+        for k, old in enumerate(self.found.curves):
+            new, self.found.curves[k] = apart(self.plane, new, old, self.tolerance)
+        self.found.curves.append(new)
 
     def _seed(self, line: OnsetLine, onset: Onset) -> CurvePoint | None:
         kind: Kind = "standstill" if onset.kind == "divergence" else "crossing"

@@ -21,6 +21,7 @@ from ...sliding import (
     steady_nodes,
     steady_sliding,
 )
+from ...sliding.motions import placed
 from ...sliding.solution import STILL
 from ...sliding.stick_slip import StickRows
 from ...system import System
@@ -195,7 +196,7 @@ class Steadiness:
         try:
             steady = self._steady(mu)
         except AnalysisError as error:
-            raise AnalysisError(f"{error}; that is at μ = {mu:g}, of the range that was asked for") from error
+            raise AnalysisError(placed(error, mu, ", of the range that was asked for")) from error
         weakening = damping = None
         if self.friction_damping and mu:
             damping = friction_damping_matrix(self.system, steady, slope=False)

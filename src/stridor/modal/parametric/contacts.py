@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from ...case.usual import MOST_FRICTION, TOO_MUCH
 from ...errors import CaseError, NotReducibleError
 from ...system import System
 from ...typing import BoolArray, Sparse
@@ -244,6 +245,8 @@ def friction_range(between: tuple[float, float]) -> Parameter:
     low, high = (float(v) for v in between)
     if not low >= 0:
         raise CaseError(f"box.{FRICTION}", between, "friction coefficients are ≥ 0")
+    if between[1] > MOST_FRICTION:
+        raise CaseError(f"box.{FRICTION}", between, TOO_MUCH)
     return Parameter(FRICTION, low, high, value=(low + high) / 2)
 
 

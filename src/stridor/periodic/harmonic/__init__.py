@@ -6,6 +6,7 @@ from .branch import HarmonicBranch
 from .from_run import from_run
 from .hill import Hill, hill
 from .problem import HarmonicFamily, why_not_harmonic
+from .same import same_cycle
 from .sampling import sampled_series
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "guessed",
     "hill",
     "kept",
+    "same_cycle",
     "sampled_series",
     "slip_amplitudes",
     "why_not_harmonic",

@@ -233,7 +233,7 @@ class ExactStepper:
         if steady:
             if stretch.ramp_steps:
                 ramp = stretch.ramp_steps * schedule.step
-                raise CaseError("phases.0.ramp", ramp, "0 when starting from steady sliding")
+                raise CaseError("phases.0.ramp", ramp, "must be 0 when starting from steady sliding")
             found = steady_sliding(
                 system.in_place(stretch.distances_after),
                 load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),

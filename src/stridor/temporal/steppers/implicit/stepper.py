@@ -195,7 +195,8 @@ class ImplicitStepper:
         """Displacement (n,) of steady sliding; forces, status and motion of the supports into the state."""
         system, state, stretch = self._system, self.moving, schedule.stretches[0]
         if stretch.ramp_steps:
-            raise CaseError("phases.0.ramp", stretch.ramp_steps * schedule.step, "0 when starting from steady sliding")
+            ramp = stretch.ramp_steps * schedule.step
+            raise CaseError("phases.0.ramp", ramp, "must be 0 when starting from steady sliding")
         steady = steady_sliding(
             system.in_place(stretch.distances_after),
             load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),

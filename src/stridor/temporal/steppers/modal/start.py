@@ -41,7 +41,8 @@ def initial_state(
         state.motion[1] = stretch.velocities_after
         state.status[:] = np.where(steady.active, 2, 0)
         if stretch.ramp_steps:
-            raise CaseError("phases.0.ramp", stretch.ramp_steps * schedule.step, "0 when starting from steady sliding")
+            ramp = stretch.ramp_steps * schedule.step
+            raise CaseError("phases.0.ramp", ramp, "must be 0 when starting from steady sliding")
     own = motion_of_bodies(system, schedule) if settings.initial == "rest" else None
     for added in (own, disturbance):
         if added is None:

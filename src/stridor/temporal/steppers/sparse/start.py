@@ -48,7 +48,8 @@ def _steady(machine: Machine, schedule: Schedule, settings: Settings) -> tuple[A
     """Displacement and velocity (n,) of steady sliding, with the perturbation of the slip speed."""
     system, stretch = machine.system, schedule.stretches[0]
     if stretch.ramp_steps:
-        raise CaseError("phases.0.ramp", stretch.ramp_steps * schedule.step, "0 when starting from steady sliding")
+        ramp = stretch.ramp_steps * schedule.step
+        raise CaseError("phases.0.ramp", ramp, "must be 0 when starting from steady sliding")
     steady = steady_sliding(
         system.in_place(stretch.distances_after),
         load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
