@@ -23,8 +23,10 @@ import stridor
 from stridor.contact import curve
 from stridor.kernels import folder as folders
 from stridor.kernels import njit
+from stridor.kernels import turns as turns_module
 from stridor.kernels.folder import ABOUT, Folder, kernel_folder
 from stridor.kernels.sources import ABOVE, Sources, read_sources
+from stridor.kernels.turns import Turn
 
 PACKAGE = Path(stridor.__file__).parent
 
@@ -570,3 +572,65 @@ def test_what_makes_arrays_cannot_say_that_it_makes_none():
 
     with pytest.raises(numba.core.errors.NumbaError, match="Only accept returning of array passed into the function"):
         mirrored(np.ones(3))
+
+
+# -- one process compiles
+# ----------------------------------------------------------------------------------------------------------
+
+TURNS = """
+import sys
+import numpy as np
+from stridor.kernels import njit
+
+
+@njit(cache=True)
+def doubled(x):
+    return 2.0 * x
+
+
+if __name__ == "__main__":
+    import turns
+
+    print("begun", flush=True)
+    print(turns.doubled(3.0), sum(turns.doubled.stats.cache_hits.values()), flush=True)
+"""
+
+
+@pytest.mark.skipif(turns_module.fcntl is None, reason="no locks on Windows: every process compiles for itself")
+def test_of_two_processes_one_compiles_and_the_other_takes_what_it_has_kept(tmp_path, monkeypatch):
+    (tmp_path / "turns.py").write_text(TURNS)
+    cache = tmp_path / "cache"
+    environment = {"PYTHONPATH": f"{PACKAGE.parent}{os.pathsep}{tmp_path}", "STRIDOR_CACHE_DIR": str(cache)}
+    words = [sys.executable, str(tmp_path / "turns.py")]
+
+    def run() -> subprocess.Popen[str]:
+        own = {k: v for k, v in os.environ.items() if k not in ("NUMBA_CACHE_DIR", "PYTHONPATH")}
+        return subprocess.Popen(words, env=own | environment, stdout=subprocess.PIPE, text=True)
+
+    assert python(words[1], environment=environment)[0].split()[-1] == "0"
+    (turn,) = (path for path in cache.rglob("turns.doubled*.turn") if "py" in path.name)
+    kept = {path: path.read_bytes() for path in cache.rglob("turns.doubled*.nb[ic]")}
+    for path in kept:
+        path.unlink()
+    mine = Turn(str(turn))
+    mine.take()
+    other = run()
+    assert other.stdout is not None
+    assert other.stdout.readline() == "begun\n"
+    with pytest.raises(subprocess.TimeoutExpired):
+        other.wait(1.0)  # it waits for what this process keeps
+    for path, content in kept.items():
+        path.write_bytes(content)
+    mine.give()
+    assert other.stdout.read().split() == ["6.0", "1"]
+    assert other.wait(60) == 0
+    # Nobody is waited for for ever, nor is one that has ended in the middle.
+    monkeypatch.setattr(turns_module, "LONGEST", 0.1)
+    mine.take()
+    late = Turn(str(turn))
+    late.take()
+    assert late._file is None
+    mine.give()
+    late.take()
+    assert late._file is not None
+    late.give()

@@ -1,6 +1,6 @@
 """The folder of compiled functions: one for each state of the sources, in the user's cache.
 
-    CACHE/stridor/kernels/SOURCES-PLATFORM/about.json, *.nbi, *.nbc
+    CACHE/stridor/kernels/SOURCES-PLATFORM/about.json, *.nbi, *.nbc, *.turn
 
 CACHE is STRIDOR_CACHE_DIR, else NUMBA_CACHE_DIR, else the user's cache folder, else a private one among the temporary
 files; else nothing is kept. Changed sources have another folder, so old code cannot be met. What another state of the
@@ -35,7 +35,7 @@ except ImportError:  # not on Windows
 VARIABLE = "STRIDOR_CACHE_DIR"
 ABOUT = "about.json"
 NAME = re.compile(r"[0-9a-f]{24}-[0-9a-f]{12}")
-OURS = re.compile(r".*\.(nbi|nbc)(\.tmp\.[0-9a-f]+)?")
+OURS = re.compile(r".*\.(nbi|nbc|turn)(\.tmp\.[0-9a-f]+)?")
 UNUSED_DAYS = 30.0  # folders of other installations, which may come back
 DAY = 86400.0
 _CHECK_EVERY = 1.0  # seconds between looks at the sources

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import os
 import pickle
 import sys
 import uuid
@@ -16,6 +17,7 @@ from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataC
 from ..interrupts import in_one_piece
 from .folder import Folder
 from .sources import PACKAGE
+from .turns import Turn
 
 _Cache: Any = FunctionCache
 _Way: Any = CompileResultCacheImpl
@@ -109,19 +111,33 @@ class KernelCache(_Cache):
         self._cache_path = folder.path
         base = self._impl.filename_base
         self._cache_file = _Files(folder.path, base, _stamp(function))
+        self._turn = Turn(os.path.join(folder.path, f"{base}.turn"))
         self.enable()
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compiled form for a signature, None where there is none that can be used."""
+        """The compiled form for a signature, None where there is none that can be used: then it is this process's turn
+        to compile it, until `save_overload`."""
         if not self._folder.valid():
             return None
+        found = self._loaded(sig, target_context)
+        if found is None:
+            self._turn.take()
+            found = self._loaded(sig, target_context)  # somebody else may have had the turn before
+            if found is not None:
+                self._turn.give()
+        return found
+
+    def _loaded(self, sig: Any, target_context: Any) -> Any:
         with in_one_piece():  # a callback fetches it
             return super().load_overload(sig, target_context)
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a compiled form; where that cannot be done, a note says so."""
-        if self._folder.valid():
-            super().save_overload(sig, data)
+        try:
+            if self._folder.valid():
+                super().save_overload(sig, data)
+        finally:
+            self._turn.give()
 
     @contextlib.contextmanager
     def _guard_against_spurious_io_errors(self) -> Generator[None, None, None]:
