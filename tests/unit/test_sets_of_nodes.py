@@ -261,16 +261,16 @@ def test_a_large_structure_that_nothing_holds_is_not_asked_for_every_set(monkeyp
 def test_a_body_that_moves_a_million_times_its_size_is_loose(monkeypatch, size: float, held: bool) -> None:
     # A bar of 3 m far from the origin: its extent counts, not where it is.
     bar = SimpleNamespace(points=np.array([[50.0, 10.0], [53.0, 10.5]]))
-    system = SimpleNamespace(lines=(), solids=(bar,))
+    system, force = SimpleNamespace(lines=(), solids=(bar,), stiffness=sp.eye_array(2, format="csr")), np.zeros(2)
     monkeypatch.setattr(solution, "_loose", lambda *given: "it is loose")
     state = NodeEquilibrium(np.zeros(0, dtype=bool), np.array([0.0, -size]), np.zeros(0), np.zeros(0))
     if held:
-        solution._require_held(system, None, state, 1e-9)
+        solution._require_held(system, None, state, 1e-9, force)
         with pytest.raises(AnalysisError, match="it is loose"):
-            solution._require_held(system, None, state, 2e-8)
+            solution._require_held(system, None, state, 2e-8, force)
     else:
         with pytest.raises(AnalysisError, match="it is loose"):
-            solution._require_held(system, None, state, 1e-9)
+            solution._require_held(system, None, state, 1e-9, force)
 
 
 def hardening(cubic: tuple[float, ...], *, gap=(0.0, 0.0), load: float = 1.0) -> Equilibrium:
