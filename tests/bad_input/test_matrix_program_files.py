@@ -59,6 +59,14 @@ def test_the_files_used_here_are_good(tmp_path):
     assert read_matrix("b.op4").matrix.toarray().tolist() == [[1.0, 0.0], [2.0, 4.0]]
 
 
+@pytest.mark.parametrize("line", ['INCLUDE "more.bdf"', "  include 'a,b.bdf'", "INCLUDE more.bdf", "Include=/x/more.bdf"])
+def test_bulk_data_in_other_files_is_not_left_out_silently(refused, line):
+    """Columns may be in there."""
+    said = refused("a.bdf", f"SOL 103\nBEGIN BULK\n{PCH}{line}\nENDDATA\n")
+    assert said.startswith("a.bdf, line ")
+    assert said.endswith("INCLUDE, and files taken in are not read: bring all cards into one file")
+
+
 def test_what_is_no_file(tmp_path, refused):
     (tmp_path / "folder.mtx").mkdir()
     for file, words in (

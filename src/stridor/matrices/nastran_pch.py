@@ -1,12 +1,14 @@
 """Nastran matrices as DMIG cards, in punch files (.pch) or among other bulk data.
 
 A header card says what a matrix is, a card for each column lists its entries as (grid, component, value, imaginary).
-Small fields of 8, large fields of 16 (DMIG*) and fields between commas may be mixed; all other cards are passed over.
+Small fields of 8, large fields of 16 (DMIG*) and fields between commas may be mixed; all other cards are passed over,
+but for INCLUDE, which is refused: what it takes in may be columns.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,6 +23,7 @@ from .nastran import LARGEST_GRID, REAL, SYMMETRIC, check_form, named
 from .numbers import fortran_number, whole_number
 from .source import Doubt, MatrixFile, printable, source_at, unended
 
+_INCLUDE = re.compile(r"\s*INCLUDE\b\s*[='\"\w./\\]", re.IGNORECASE)
 _FIRST_ENTRY = 4  # name, grid and component of the column, nothing
 _ACCEPTED = (1, SYMMETRIC)
 _FORMS = {2: "rectangular", 9: "rectangular"}
@@ -102,6 +105,8 @@ def _cards(source: MatrixFile, data: bytes) -> Iterator[_Card]:
         line = raw.partition("$")[0].rstrip()
         if not line.strip():
             continue
+        if _INCLUDE.match(line):
+            source.refuse_line(number, raw, "INCLUDE, and files taken in are not read: bring all cards into one file")
         free = "," in line
         if not free and "\t" in line:
             line = line.expandtabs(8)
