@@ -187,12 +187,18 @@ def of_run(summary: dict[str, Any], *, slides: bool = True) -> Conclusion:
 
 def of_reduced(
     document: Sequence[dict[str, Any]], found: ParametricOnsets | None, ranges: Mapping[str, str], *,
-    elsewhere: bool = False,
+    elsewhere: bool = False, doubtful: bool = False,
 ) -> Conclusion:  # fmt: skip
     """What grows at the points that were asked for, and where growth begins; then the other of the two. ranges: of each
-    parameter, as --at takes them. elsewhere: whether other nodes touch at some values than those that are held."""
+    parameter, as --at takes them. elsewhere: whether other nodes touch at some values than those that are held;
+    doubtful: at some of those asked for, or may."""
     first = next(iter(ranges))
     onsets = None if found is None else of_onsets_along(found).sentence
+    if elsewhere or doubtful:
+        touch = "touch" if elsewhere else "touch, or may,"
+        held = f", with the nodes that are held: others {touch} at some values, see the note{'' if elsewhere else 's'}"
+    else:
+        held = ""
     if not document:
         return Conclusion(onsets or "", "reduce", ("--at", f"{first}={ranges[first]}"))
     some = sum(any(point["unstable"]) for point in document)
@@ -201,7 +207,7 @@ def of_reduced(
     if some:
         rate, frequency = max(modes)
         said += f"; the fastest {fastest(frequency, rate)}"
-    said += ", with the nodes that are held: others touch at some values, see the note" if elsewhere else ""
+    said += held
     if onsets is None:
         return Conclusion(said, "reduce", ("--onsets", first))
     return Conclusion(f"{said}\n{onsets}")

@@ -11,8 +11,8 @@ steady sliding adds (`contacts_steady`) are further terms, and rigid contact is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -29,7 +29,7 @@ from .contacts_sampling import Values
 from .contacts_steady import FRICTION, STIFFNESS, Contacts, contacts_of, steady_terms
 from .factors import ParameterFactor, Product
 from .family import FactoredPart, deviation, interpolated_terms
-from .problem import Parameter, ParametricProblem
+from .problem import NOT_KNOWN, Parameter, ParametricProblem
 
 SAME = 1e-13  # rows of rigid contact, of their largest entry
 
@@ -40,13 +40,27 @@ class ContactsProblem(ParametricProblem):
 
     elimination: how rigid contact was taken out of it, which leaves fewer freedoms than the system has; None where
     there is none. notes: sentences on what its user should know; elsewhere: those of them on values at which other
-    nodes touch, which nothing of the problem holds for. touching (m,): which of the contact nodes it holds.
+    nodes touch, which nothing of the problem holds for. touching (m,): which of the contact nodes it holds. looked:
+    says of points how many others touch there, as `unlike` has it; None where nobody can solve for steady sliding, as
+    in a model from a file.
     """
 
     elimination: Elimination | None = None
     notes: tuple[str, ...] = ()
     elsewhere: tuple[str, ...] = ()
     touching: BoolArray | None = None
+    looked: Callable[[Sequence[Values]], tuple[str, ...]] | None = field(default=None, compare=False, repr=False)
+
+    def unlike(self, points: Sequence[Mapping[str, float]]) -> tuple[str, ...]:
+        """Of each point, in the box or not, words on what touches there in steady sliding beside the nodes that are
+        held, or on that this is not known; "" where they are those of steady sliding."""
+        full = [self.point(values) for values in points]
+        if self.touching is None:
+            return ("",) * len(full)
+        if self.looked is not None:
+            return self.looked(full)
+        # Of the box `elsewhere` tells, which was looked at when the model was made.
+        return tuple("" if self.inside(values) else NOT_KNOWN for values in full)
 
     @property
     def idle_words(self) -> tuple[str, ...]:
