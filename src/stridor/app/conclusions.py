@@ -191,14 +191,12 @@ def of_reduced(
 ) -> Conclusion:  # fmt: skip
     """What grows at the points that were asked for, and where growth begins; then the other of the two. ranges: of each
     parameter, as --at takes them. elsewhere: whether other nodes touch at some values than those that are held;
-    doubtful: at some of those asked for, or may."""
+    doubtful: whether the model does not hold at some of those asked for, or may not."""
     first = next(iter(ranges))
     onsets = None if found is None else of_onsets_along(found).sentence
-    if elsewhere or doubtful:
-        touch = "touch" if elsewhere else "touch, or may,"
-        held = f", with the nodes that are held: others {touch} at some values, see the note{'' if elsewhere else 's'}"
-    else:
-        held = ""
+    held = ", with what the model holds: that is not so, or not known to be, at some values, see the notes"
+    if elsewhere:
+        held = ", with the nodes that are held: others touch at some values, see the note"
     if not document:
         return Conclusion(onsets or "", "reduce", ("--at", f"{first}={ranges[first]}"))
     some = sum(any(point["unstable"]) for point in document)
@@ -207,7 +205,7 @@ def of_reduced(
     if some:
         rate, frequency = max(modes)
         said += f"; the fastest {fastest(frequency, rate)}"
-    said += held
+    said += held if elsewhere or doubtful else ""
     if onsets is None:
         return Conclusion(said, "reduce", ("--onsets", first))
     return Conclusion(f"{said}\n{onsets}")

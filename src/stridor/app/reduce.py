@@ -281,7 +281,7 @@ def _show_modes(model: ReducedModel, document: list[dict[str, Any]]) -> None:
                 "unstable": mode["unstable"],
                 "error above the bound": not mode["passed"],
                 "outside the box": not point["inside"],
-                "other nodes touch": point.get("unlike", NOT_KNOWN) != NOT_KNOWN,
+                "does not hold": point.get("unlike", NOT_KNOWN) != NOT_KNOWN,
                 "who touches is not known": point.get("unlike") == NOT_KNOWN,
                 f"corrected {point['corrections']} ×": point["corrections"],
             }

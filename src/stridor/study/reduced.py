@@ -33,7 +33,7 @@ from .workspace import Problem, Workspace
 
 if TYPE_CHECKING:
     from ..modal.parametric import Parameter, ReducedModel
-    from ..modal.parametric.contacts import ContactsProblem
+    from ..modal.parametric.contacts import ContactsProblem, ParametricSystems
     from ..modal.parametric.family import FactoredPart
     from ..modal.parametric.problem import Role
 
@@ -119,7 +119,7 @@ def parametric_problem(
 ) -> ContactsProblem:
     """The matrices of a case as sums of terms in the numbers of a box, as `reduced_model` takes it."""
     from ..modal.options import Options
-    from ..modal.parametric.contacts import FRICTION, STIFFNESS, ParametricSystems, contacts_problem
+    from ..modal.parametric.contacts import FRICTION, STIFFNESS, contacts_problem
 
     parameters = _parameters(case, box)
     numbers = Numbers(case, box)
@@ -129,15 +129,8 @@ def parametric_problem(
             if name in box and name not in elsewhere:
                 why = "the case has no contacts and no factor that names it, so that nothing depends on it"
                 raise CaseError(f"box.{name}", None, f"{why}; take another number")
-    exact = {FRICTION, STIFFNESS, *case.parameters}
     settings = case.modal
-    family = ParametricSystems(
-        numbers.own if held_at is None else numbers.pressed(held_at),
-        numbers.system,
-        numbers.structure,
-        parameters,
-        tuple(p for p in parameters if p.name not in exact),
-    )
+    family = _family(case, numbers, parameters, numbers.own if held_at is None else numbers.pressed(held_at))
     solver = None if settings.solver == "auto" else settings.solver
     friction = next((p for p in parameters if p.name == FRICTION), None)
     if held_at is not None:
@@ -160,9 +153,20 @@ def parametric_problem(
     return replace(problem, notes=notes, elsewhere=where, looked=_Looked(case, box, problem))
 
 
+def _family(
+    case: Case, numbers: Numbers, parameters: tuple[Parameter, ...], own: System
+) -> ParametricSystems:
+    """The systems over parameters, of which own says which nodes touch."""
+    from ..modal.parametric.contacts import FRICTION, STIFFNESS, ParametricSystems
+
+    exact = {FRICTION, STIFFNESS, *case.parameters}
+    interpolated = tuple(p for p in parameters if p.name not in exact)
+    return ParametricSystems(own, numbers.system, numbers.structure, parameters, interpolated)
+
+
 class _Looked:
-    """At which points others than the nodes that a problem holds touch, in words, each looked at once. Systems are
-    built when they are asked for: a model outlives them."""
+    """At which points a problem does not hold, in words, each looked at once. Systems are built when they are asked
+    for: a model outlives them."""
 
     def __init__(self, case: Case, box: Mapping[str, tuple[float, float]], problem: ContactsProblem) -> None:
         self._case, self._box, self._problem = case, dict(box), problem
@@ -179,17 +183,27 @@ class _Looked:
         from ..modal.parametric.contacts_steady import unlike_at
 
         numbers, problem = Numbers(self._case, self._box), self._problem
-        assert problem.touching is not None, "asked only where there are contacts"
-        held = np.flatnonzero(problem.touching)
-        points = _by_system(new.values())
-        same = [at for at in points if numbers.system(at).contact_nodes().count == len(problem.touching)]
-        found = unlike_at(numbers.system, held, same, _solver(self._case))
+        touching = np.zeros(0, dtype=bool) if problem.touching is None else problem.touching
+        held, points = np.flatnonzero(touching), _by_system(new.values())
+        same = [at for at in points if numbers.system(at).contact_nodes().count == len(touching)]
+        found = unlike_at(numbers.system, held, same, _solver(self._case)) if len(touching) else []
         self._known |= {key: "others can touch" for key in new}
         self._known |= {_key(at): "" for at in same} | {_key(at): words for at, words in found}
         for at in same:
             # In the box the problem was refused for these.
             if not self._known[_key(at)] and not problem.inside(at):
-                self._known[_key(at)] = _slides_unlike(numbers, held, at)
+                self._known[_key(at)] = _slides_unlike(numbers, held, at) or self._deviates(numbers, held, at)
+
+    def _deviates(self, numbers: Numbers, held: IntArray, at: Mapping[str, float]) -> str:
+        """Words on that the matrices are no longer what they are made of in the box."""
+        from ..modal.parametric.contacts import deviates
+        from ..modal.parametric.family import EXACT
+
+        family = _family(self._case, numbers, self._problem.parameters, numbers.own)
+        if all(p.low <= at[p.name] <= p.high for p in family.interpolated):
+            return ""
+        off = deviates(family, held, at)
+        return f"the model's matrices are off by {off:.1e} there" if off > 10 * EXACT else ""
 
 
 def _key(point: Mapping[str, float]) -> tuple[tuple[str, float], ...]:

@@ -321,7 +321,7 @@ def _roots(
 
 
 def unlike_along(model: ReducedModel, parameter: str, fixed: Mapping[str, float] | None = None) -> str:
-    """Words on that others than the held nodes touch somewhere on the line of `onsets_along`, or that it is not
+    """Words on that the model does not hold somewhere on the line of `onsets_along`, or that it is not
     known; "" where they do not. Of a box of one number, and of what is dear inside of it, `elsewhere` tells."""
     point = model.problem.point(fixed or {})
     problem, cheap = model.problem, parameter in (FRICTION, STIFFNESS)
@@ -340,6 +340,6 @@ def unlike_along(model: ReducedModel, parameter: str, fixed: Mapping[str, float]
     at, words = said[0]
     where = f"{parameter} = {at[parameter]:.4g}" + (f", {others}" if others else "")
     return (
-        f"others than the nodes that are held touch at {len(said)} of {count} values that were looked at, such as "
-        f"{where} ({words}), and modes there are other ones"
+        f"the model does not hold at {len(said)} of {count} values that were looked at, such as {where} ({words}), and "
+        "modes there are other ones"
     )

@@ -25,8 +25,8 @@ class ModesAtPoints(Tabular, Shown):
     """Modes at points (p,): parameters, their names, and values (p, n) there. frequency_hz [Hz], growth_rate [1/s],
     error (relative, estimated) and residual (p, m), NaN where a point has fewer modes than others; unstable, passed
     (error below the model's bound) (p, m). inside (p,): whether in the model's box; corrections (p,): steps taken.
-    unlike: of each point what touches there beside the nodes that the model holds, in words, or that this is not known;
-    "" where they are those of steady sliding, and none of it where nobody looked."""
+    unlike: of each point why the model does not hold there, in words, as where others touch than the nodes that it
+    holds, or that this is not known; "" where it holds, and none of it where nobody looked."""
 
     parameters: tuple[str, ...]
     values: Array
@@ -89,7 +89,7 @@ class ModesAtPoints(Tabular, Shown):
         return len(self.values)
 
     def unlike_words(self) -> tuple[str, ...]:
-        """A sentence on the points at which others touch than the nodes that are held; () for none."""
+        """A sentence on the points at which the model does not hold; () for none."""
         return unlike_words(self.parameters, self.values.tolist(), self.unlike)
 
     def counts(self) -> list[int]:
@@ -156,8 +156,8 @@ class ModesAtPoints(Tabular, Shown):
 
 
 def unlike_words(names: Sequence[str], values: Sequence[Sequence[float]], unlike: Sequence[str]) -> tuple[str, ...]:
-    """A sentence on those of some points (p, n) at which others touch than the nodes that a model holds, as ``unlike``
-    (p,) says of each; () where it says so of none."""
+    """A sentence on those of some points (p, n) at which a model does not hold, as ``unlike`` (p,) says of each; ()
+    where it says so of none."""
     told = [
         f"{', '.join(f'{name} = {value:.4g}' for name, value in zip(names, at, strict=True))} ({words})"
         for at, words in zip(values, unlike, strict=False)
@@ -167,9 +167,5 @@ def unlike_words(names: Sequence[str], values: Sequence[Sequence[float]], unlike
         return ()
     rest = f" and {len(told) - NAMED} more" if len(told) > NAMED else ""
     known = any(words and words != NOT_KNOWN for words in unlike)
-    what = "do not hold" if known else "may not hold"
-    have = "`stridor modes` has the others" if known else "given the case file in place of the model it is looked at"
-    return (
-        f"Modes {what} at {'; '.join(told[:NAMED])}{rest}, where they are those of the nodes that the model holds: "
-        f"{have}.",
-    )
+    have = "`stridor modes` has those there" if known else "given the case file in place of the model it is looked at"
+    return (f"Modes of the model {'do' if known else 'may'} not hold at {'; '.join(told[:NAMED])}{rest}: {have}.",)
