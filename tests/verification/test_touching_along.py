@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 import stridor as st
 from stridor.app.cli import app
+from stridor.app.conclusions import of_onsets_along
 from stridor.modal.full import onsets_along, unlike_along
 from stridor.study.boundary import stability_boundary
 
@@ -180,6 +181,7 @@ def test_what_lies_outside_the_box_of_a_model_is_looked_at_like_the_box(tmp_path
     found = onsets_along(model, "mu", far, confirm=False)
     assert not found.complete
     assert found.sentence.startswith("Not complete: the model does not hold at 9 of 9 values")
+    assert of_onsets_along(found).sentence.endswith(", but see above")
     done = CliRunner().invoke(app, ["reduce", str(path), "--at", f"{SIDEWAYS}=600", "--onsets", "mu", "--out", str(tmp_path / "out")])
     told = " ".join(done.output.split())
     assert done.exit_code == 3

@@ -93,10 +93,9 @@ def of_onsets_along(found: ParametricOnsets) -> Conclusion:
     if not found:
         return Conclusion(f"no onset {over}" + ("" if found.complete else ", but see above"))
     count = f"{len(found)} onsets" if len(found) > 1 else "1 onset"
-    if not begins:
-        return Conclusion(f"{count} {over}; growth ends at {found[0].value:.6g}, {readable(found[0].frequency_hz)} Hz")
-    first = begins[0]
-    return Conclusion(f"{count} {over}; growth begins at {first.value:.6g}, {readable(first.frequency_hz)} Hz")
+    first, what = (begins[0], "begins") if begins else (found[0], "ends")
+    seen = "" if found.complete else ", but see above"
+    return Conclusion(f"{count} {over}; growth {what} at {first.value:.6g}, {readable(first.frequency_hz)} Hz{seen}")
 
 
 def of_shapes(documents: Sequence[dict[str, Any]], mu: str | None) -> Conclusion:
