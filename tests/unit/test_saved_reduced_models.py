@@ -108,7 +108,13 @@ def test_a_model_comes_back_to_the_last_bit(model, case, tmp_path):
             assert mine == theirs, one.name
     assert type(back.problem) is type(model.problem)
     known = {"terms", "parameters", "elimination", "notes", "elsewhere", "touching"}
-    assert {f.name for f in fields(model.problem)} <= known  # a new one must be saved, and looked at below
+    asks = {"looked"}  # builds systems of the case, which a file has not: its model says that it does not know
+    assert {f.name for f in fields(model.problem)} <= known | asks  # a new one must be saved, and looked at below
+    outside = {"contact_stiffness": 3.0}
+    assert model.problem.looked is not None
+    assert back.problem.looked is None
+    assert model.unlike([{}, outside]) == ("", "")
+    assert back.unlike([{}, outside]) == ("", "outside the box, and the model does not know which nodes touch there")
     assert back.problem.parameters == model.problem.parameters
     for name in ("notes", "elsewhere"):
         assert getattr(back.problem, name, ()) == getattr(model.problem, name, ())

@@ -123,11 +123,16 @@ def test_of_few_rows_one_at_least_is_confirmed(case: st.Case, tmp_path: Path) ->
 
 def test_onsets_of_a_model_that_holds_its_contact_nodes_are_headed_so(capsys: pytest.CaptureFixture[str]) -> None:
     from stridor.app.along import show_onsets_along
+    from stridor.app.conclusions import of_onsets_along
     from stridor.modal.full import onsets_along
     from stridor.study.reduced import reduced_model
 
     few = st.loads(template_text("two-beams"), [*FEW, "modal.max_frequency_hz=9e3"])
     found = onsets_along(reduced_model(few, {"mu": (0.0, 0.9)}), "mu", {})
+    assert len(found) > 0
+    for whole in (True, False):
+        found.complete = whole
+        assert of_onsets_along(found).sentence.endswith(", but see above") != whole
     for held in (True, False):
         show_onsets_along(found, confirmed=True, held=held)
         title = " ".join(capsys.readouterr().out.split())

@@ -11,6 +11,8 @@ from typer.testing import CliRunner
 
 import stridor as st
 from stridor.app.cli import app
+from stridor.app.conclusions import of_onsets_along
+from stridor.modal.full import onsets_along, unlike_along
 from stridor.study.boundary import stability_boundary
 
 pytestmark = pytest.mark.verification
@@ -157,3 +159,40 @@ def test_models_that_hold_the_nodes_of_the_case_call_nothing_complete(tmp_path):
     done = CliRunner().invoke(app, ["reduce", str(path), *box, "--out", str(tmp_path / "out")])
     assert done.exit_code == 3
     assert "with the nodes that are held: others touch at" in " ".join(done.stdout.split())
+
+
+def test_what_lies_outside_the_box_of_a_model_is_looked_at_like_the_box(tmp_path):
+    """Pressed sideways by 600 N a node lifts off, by −60 N none does: `steady_sliding` of the case rebuilt there."""
+    case, path = pad().with_({"modal.max_frequency_hz": 4e3}), tmp_path / "model.npz"
+    model = st.reduced_model(case, {"mu": (0.26, 0.29), SIDEWAYS: (-50.0, 50.0)})
+    st.save(model, path, case=case)
+    kept = st.open(path)
+    assert not model.problem.elsewhere
+    near, far = {SIDEWAYS: -60.0}, {SIDEWAYS: 600.0}
+    lifts = "1 of 4 touching nodes would lift off"
+    unknown = "outside the box, and the model does not know which nodes touch there"
+    assert model.unlike([{}, near, far, {**far, "mu": 0.35}]) == ("", "", lifts, lifts)
+    assert kept.unlike([{}, near, far]) == ("", unknown, unknown)
+    for point, touching in (({}, 4), (near, 4), (far, 3)):
+        assert st.steady_sliding(st.build_system(case.with_(point)), mu=0.275).active.sum() == touching
+    assert unlike_along(model, "mu", near) == ""
+    assert unlike_along(model, "mu", far).startswith("the model does not hold at 9 of 9 values")
+    assert unlike_along(kept, "mu", near) == f"{SIDEWAYS} = -60 lies {unknown}"
+    found = onsets_along(model, "mu", far, confirm=False)
+    assert not found.complete
+    assert found.sentence.startswith("Not complete: the model does not hold at 9 of 9 values")
+    assert of_onsets_along(found).sentence.endswith(", but see above")
+    done = CliRunner().invoke(app, ["reduce", str(path), "--at", f"{SIDEWAYS}=600", "--onsets", "mu", "--out", str(tmp_path / "out")])
+    told = " ".join(done.output.split())
+    assert done.exit_code == 3
+    assert f"note: Modes of the model may not hold at mu = 0.275, {SIDEWAYS} = 600 ({unknown})" in told
+    assert "with what the model holds: that is not so, or not known to be, at some values, see the notes" in told
+
+
+def test_matrices_outside_the_box_of_a_model_are_those_of_the_case_or_it_does_not_hold():
+    """Poisson's ratio from 0.24 to 0.26 is a polynomial but for rounding, and at 0.4 no longer: λ is 0.6 % off there."""
+    case, ratio, thickness = pad().with_({"modal.max_frequency_hz": 4e3}), "materials.soft.poisson_ratio", "bodies.pad.thickness"
+    model = st.reduced_model(case, {ratio: (0.24, 0.26)})
+    assert model.unlike([{}, {ratio: 0.4}])[0] == ""
+    assert "the model's matrices are off by 3.3e-02 there" in model.unlike([{ratio: 0.4}])
+    assert st.reduced_model(case, {thickness: (0.008, 0.012)}).unlike([{thickness: 0.03}]) == ("",)

@@ -547,3 +547,27 @@ def test_modes_are_matched_by_their_nearness_alone() -> None:
     assert jumps([2 + 200j], [3 + 300j]) == ([3 + 300j], [2 + 200j])
     far = 100j * (1 + 2 * ALIKE)
     assert jumps([], [far]) == ([far], [])
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "begins", "ends"),
+    [
+        ([], [700.0], 1, 0),  # one real root
+        ([40 + 900j], [700.0, 60.0], 2, 1),  # a pair falls apart, far from where it was
+        ([700 + 10j], [720.0, 690.0], 0, 0),  # and near it: as many grow as before
+        ([720.0, 690.0], [700 + 10j], 0, 0),
+        ([700 + 10j], [720.0], 1, 1),  # of a pair one root is left
+        ([40 + 900j, 700.0], [41 + 905j, 705.0], 0, 0),
+    ],
+)  # fmt: skip
+def test_as_many_eigenvalues_grow_behind_a_border_as_its_onsets_say(
+    before: list[complex], after: list[complex], begins: int, ends: int
+) -> None:
+    def roots(values: list[complex], *, ends: bool) -> int:
+        about = {"mu": 0.3, "damped": True, "branches": (1, 1), "residual": 0.0, "square_root_coefficient": None, "growth_slope": None}
+        return sum(Onset(frequency_hz=abs(complex(v).imag) / (2 * np.pi), kind="contact", stabilising=ends, **about).roots for v in values)
+
+    begun, ended = jumps(before, after)
+    assert (len(begun), len(ended)) == (begins, ends)
+    count = {side: sum(1 if complex(v).imag == 0 else 2 for v in values) for side, values in (("before", before), ("after", after))}
+    assert roots(begun, ends=False) + roots(ended, ends=True) == count["after"] - count["before"]

@@ -18,7 +18,10 @@ from ..errors import AnalysisError, CaseError
 from ..modal.complex_modes import ComplexModes
 from ..modal.growing import doubt
 from ..modal.options import Options
+from ..sliding import nothing_presses
+from ..sliding.solution import steady_nodes
 from ..system import System
+from ..temporal.ended import EndState, ended
 from ..temporal.growth import Growth, growth
 from ..temporal.schedule import PhaseSpec
 from ..temporal.shapes import operating_shape
@@ -88,7 +91,11 @@ def compare(
     """
     say = progress or _silent
     parts = chosen_parts(only, critical=critical)
-    at = _At(system, phases, settings, max_frequency_hz, runs or {}, kept, say, options)
+    state = ended(system, phases)
+    about, unlike = _about(system, state, mus)
+    if kept is not None and about is not system:
+        kept = _OfState(kept, state.words)
+    at = _At(system, about, unlike, phases, settings, max_frequency_hz, runs or {}, kept, say, options)
     comparisons: list[Comparison] = []
     of_critical = Critical()
     interrupted = False
@@ -99,7 +106,7 @@ def compare(
                 finished(comparisons[-1])
         if "critical" in parts:
             of_critical = compare_critical(
-                system,
+                about,
                 friction_range=friction_range,
                 max_frequency_hz=max_frequency_hz,
                 settings=settings,
@@ -112,6 +119,8 @@ def compare(
     except KeyboardInterrupt:
         interrupted = True
     notes = [
+        *([state.note] if about is not system else []),
+        *([f"full runs are held against no mode: {unlike}"] if unlike and "run" in parts else []),
         *_notes(system, parts, at.taken),
         *_doubts({f"modes at μ = {c.mu:g}": c.completeness for c in comparisons}),
         *_doubts({"onsets": of_critical.completeness}),
@@ -147,11 +156,48 @@ def _doubts(told: Mapping[str, str]) -> list[str]:
     return [f"{what}: {said}" for what, said in told.items() if doubt(said)]
 
 
+def _about(system: System, state: EndState, mus: Sequence[float]) -> tuple[System, str]:
+    """The system whose steady sliding runs are held against, and why that is not where they end: they still move, or
+    there is none. Where there is none it is that at full loads and speeds."""
+    try:
+        about = state.of(system)
+        if about is not system and len(mus):
+            steady = steady_nodes(about, mus[0])
+            if nothing_presses(about, steady.normal_force):
+                raise AnalysisError("nothing presses the bodies together")
+    except AnalysisError as error:
+        return system, (
+            f"phase {state.phase}, with which they end ({state.words}), has no steady sliding, and modes are those at "
+            f"full loads and speeds ({error})"
+        )
+    return about, state.still_moving()
+
+
+@dataclass
+class _OfState:
+    """Parts of a comparison with modes at other loads or speeds than full ones, kept under names of their own."""
+
+    kept: PartStore
+    words: str
+
+    def get(self, part: str, mu: float | None) -> Plain | None:
+        """What was put there, None if nothing was."""
+        return self.kept.get(f"{part} at {self.words}", mu)
+
+    def put(self, part: str, mu: float | None, data: Plain) -> None:
+        """Keep a part."""
+        self.kept.put(f"{part} at {self.words}", mu, data)
+
+
 @dataclass
 class _At:
-    """Both approaches at one μ after the other. taken: what came from an earlier call, in words."""
+    """Both approaches at one μ after the other. about: the system in the state that the run ends with, whose steady
+    sliding modes and small perturbations are of; unlike: why it ends in none, "" where it does. taken: what came from
+    an earlier call, in words."""
 
     system: System
+    about: System
+    unlike: str
     phases: Sequence[PhaseSpec]
     settings: Settings
     limit: float
@@ -188,30 +234,33 @@ class _At:
             answered = self._answer(mu, run, self._modes(mu) if modes is None else modes)
             self._keep("run", mu, _run_data(answered))
         verdict = likeness(found.verdict, answered.dominant, answered.mac, unstable=bool(found.unstable_hz))
+        if self.unlike:
+            verdict = f"{found.verdict}; the full run is held against no mode: {self.unlike}"
         return replace(
             found,
             dominant_frequency_hz=answered.dominant,
             run_growth=answered.fitted,
-            mac=answered.mac,
-            responding=answered.responding,
+            mac=None if self.unlike else answered.mac,
+            responding=None if self.unlike else answered.responding,
+            agrees=None if self.unlike and found.agrees else found.agrees,
             verdict=verdict,
             settled=answered.settled,
             unsettled=answered.unsettled,
         )
 
     def _modes(self, mu: float) -> ComplexModes:
-        return modes_as_in_time(self.system, mu, 1.02 * self.limit, self.options)
+        return modes_as_in_time(self.about, mu, 1.02 * self.limit, self.options)
 
     def _growth(self, mu: float, modes: ComplexModes) -> Comparison:
         unstable = _unstable(modes, self.limit)
-        own = modes if self.settings.system(self.system) is self.system else None
+        own = modes if self.settings.system(self.about) is self.about else None
         diverges = bool(np.any(modes.eigenvalues[0][unstable].imag == 0.0))
         if diverges:
             # Nothing vibrates about what runs away: a march tells no rate to hold against the mode's.
             perturbation = Perturbation(mu, 0j, np.zeros(0), 1.0, Components(np.zeros(0, dtype=complex), np.zeros(0)))
         else:
             perturbation = perturb(
-                self.system, mu, settings=self.settings, max_frequency_hz=self.limit, modes=own, shape=True
+                self.about, mu, settings=self.settings, max_frequency_hz=self.limit, modes=own, shape=True
             )
         lam = modes.eigenvalues[0]
         if not len(lam):
@@ -225,7 +274,7 @@ class _At:
         assert modes.right is not None, "asked for with vectors"
         alike = np.flatnonzero(_alike(lam, here))
         shape = None if perturbation.shape is None else perturbation.shape.likeness(modes.right[0, alike])
-        bodies = bool(self.system.lines or self.system.solids)
+        bodies = bool(self.about.lines or self.about.solids)
         agrees, verdict = judge(
             mu, len(unstable) > 0, here, perturbation, frequency, rate, told, shape, shape_asked=bodies,
             last=_last(modes, self.limit),
@@ -258,10 +307,10 @@ class _At:
     ) -> tuple[str, bool | None]:  # fmt: skip
         """A verdict that both disagree, or that what decays in time is no mode, held against half the time step: where
         that takes half of the difference away, the step parts them, and nothing is decided."""
-        step = perturbation_step(self.system, self.settings)
+        step = perturbation_step(self.about, self.settings)
         finer = replace(self.settings, step=step / 2)
         try:
-            fine = perturb(self.system, mu, settings=finer, max_frequency_hz=self.limit, modes=modes)
+            fine = perturb(self.about, mu, settings=finer, max_frequency_hz=self.limit, modes=modes)
         except AnalysisError:
             return verdict, agrees
         if not fine.shows or abs(fine.eigenvalue - here) > HALVED * abs(coarse.eigenvalue - here):

@@ -22,8 +22,12 @@ def onset_document(onset: ParametricOnset) -> dict[str, Any]:
     }
 
 
-def show_onsets_along(onsets: ParametricOnsets, *, confirmed: bool, held: bool = False) -> None:
-    """A table, and what was checked. held: whether the model holds the nodes that touch at the case's own friction."""
+def show_onsets_along(
+    onsets: ParametricOnsets, *, confirmed: bool, held: bool = False, doubtful: bool = False, outside: bool = False
+) -> None:
+    """A table, and what was checked. held: whether the model holds the nodes that touch at the case's own friction;
+    doubtful: whether others touch, or may, where it holds those of the case; outside: whether the other numbers lie
+    outside its box."""
     from .output import stdout
     from .tables import table
 
@@ -32,7 +36,9 @@ def show_onsets_along(onsets: ParametricOnsets, *, confirmed: bool, held: bool =
         stdout.print(f"  {onsets.sentence}")
         return
     how = "confirmed in the full model" if confirmed else "of the reduced model alone: its file has no full matrices"
-    how += ", with the nodes held that touch at the case's own friction" if held else ""
+    how += ", outside the box" if outside else ""
+    where = "at the case's own friction" if held else "in the case as it is"
+    how += f", with the nodes held that touch {where}" if held or doubtful else ""
     rows = [
         [
             f"{o.value:.9g}",

@@ -97,10 +97,9 @@ def of_onsets_along(found: ParametricOnsets) -> Conclusion:
     if not found:
         return Conclusion(f"no onset {over}" + ("" if found.complete else ", but see above"))
     count = f"{len(found)} onsets" if len(found) > 1 else "1 onset"
-    if not begins:
-        return Conclusion(f"{count} {over}; growth ends at {found[0].value:.6g}, {readable(found[0].frequency_hz)} Hz")
-    first = begins[0]
-    return Conclusion(f"{count} {over}; growth begins at {first.value:.6g}, {readable(first.frequency_hz)} Hz")
+    first, what = (begins[0], "begins") if begins else (found[0], "ends")
+    seen = "" if found.complete else ", but see above"
+    return Conclusion(f"{count} {over}; growth {what} at {first.value:.6g}, {readable(first.frequency_hz)} Hz{seen}")
 
 
 def of_shapes(documents: Sequence[dict[str, Any]], mu: str | None) -> Conclusion:
@@ -191,12 +190,16 @@ def of_run(summary: dict[str, Any], *, slides: bool = True) -> Conclusion:
 
 def of_reduced(
     document: Sequence[dict[str, Any]], found: ParametricOnsets | None, ranges: Mapping[str, str], *,
-    elsewhere: bool = False,
+    elsewhere: bool = False, doubtful: bool = False,
 ) -> Conclusion:  # fmt: skip
     """What grows at the points that were asked for, and where growth begins; then the other of the two. ranges: of each
-    parameter, as --at takes them. elsewhere: whether other nodes touch at some values than those that are held."""
+    parameter, as --at takes them. elsewhere: whether other nodes touch at some values than those that are held;
+    doubtful: whether the model does not hold at some of those asked for, or may not."""
     first = next(iter(ranges))
     onsets = None if found is None else of_onsets_along(found).sentence
+    held = ", with what the model holds: that is not so, or not known to be, at some values, see the notes"
+    if elsewhere:
+        held = ", with the nodes that are held: others touch at some values, see the note"
     if not document:
         return Conclusion(onsets or "", "reduce", ("--at", f"{first}={ranges[first]}"))
     some = sum(any(point["unstable"]) for point in document)
@@ -205,7 +208,7 @@ def of_reduced(
     if some:
         rate, frequency = max(modes)
         said += f"; the fastest {fastest(frequency, rate)}"
-    said += ", with the nodes that are held: others touch at some values, see the note" if elsewhere else ""
+    said += held if elsewhere or doubtful else ""
     if onsets is None:
         return Conclusion(said, "reduce", ("--onsets", first))
     return Conclusion(f"{said}\n{onsets}")

@@ -90,7 +90,7 @@ def reduce(
         call.say(f"{model.size} freedoms, all of them kept" if model.keeps_all else made)
 
     from ..io.left_out import kept_in
-    from ..modal.full import onsets_along
+    from ..modal.full import onsets_along, unlike_along
     from ..modal.parametric import ModesAtPoints
     from ..sliding.stretches import HELD
     from ..view.onset_plots import modes_at_points, onset_chart
@@ -105,6 +105,7 @@ def reduce(
     for path in files:
         call.say(f"written: {path}")
     points: list[dict[str, Any]] = []
+    unlike: tuple[str, ...] = ()
     if asked:
         found = ModesAtPoints.of(
             model, asked, corrections=corrections if kept_in(model) == "all" else 0, solver=chosen,
@@ -115,16 +116,25 @@ def reduce(
         call.warn(model.hidden_at([dict(zip(names, at, strict=True)) for at in found.values.tolist()]))
         files += [call.keep(found, "reduced.nc"), call.tabulate(found, "reduced.csv")]
         files.append(call.draw(modes_at_points(found), "reduced.png"))
+        unlike = found.unlike_words()
+        for note in unlike:
+            call.say(f"note: {note}")
+        notes += unlike
     confirm = kept_in(model) == "all"
     onsets: ParametricOnsets | None = None
+    elsewhere, beyond, doubt = bool(getattr(model.problem, "elsewhere", ())), False, ""
     if along is not None:
         fixed = {name: values[0] for name, values in asked.items() if name != along}
         onsets = onsets_along(model, along, fixed, confirm=confirm, solver=chosen)
         onsets.provenance = _source(origin)
+        beyond = not model.problem.inside(model.problem.point(fixed))
+        doubt = unlike_along(model, along, fixed)
         files += [call.keep(onsets, "reduced-onsets.nc"), call.tabulate(onsets, "reduced-onsets.csv")]
         files.append(call.draw(onset_chart(onsets), "reduced-onsets.png"))
     if call.json:
         document = _about(model) | {"modes": points, "onsets": [onset_document(o) for o in onsets or ()]}
+        if unlike:
+            document |= {"notes": notes}
         if onsets is not None:
             document |= {"notes": notes, "completeness": onsets.sentence, "complete": onsets.complete}
         call.document(document | {"files": [str(f) for f in files]})
@@ -132,9 +142,10 @@ def reduce(
         if points:
             _show_modes(model, points)
         if along is not None and onsets is not None:
-            show_onsets_along(onsets, confirmed=confirm, held=any(HELD in note for note in notes))
+            held = any(HELD in note for note in notes)
+            show_onsets_along(onsets, confirmed=confirm, held=held, doubtful=elsewhere or bool(doubt), outside=beyond)
         ranges = {p.name: f"{p.low:g}:{p.high:g}:5" for p in model.problem.parameters}
-        call.conclude(of_reduced(points, onsets, ranges, elsewhere=bool(getattr(model.problem, "elsewhere", ()))))
+        call.conclude(of_reduced(points, onsets, ranges, elsewhere=elsewhere, doubtful=bool(doubt or unlike)))
     if onsets is not None and not onsets.complete:
         raise typer.Exit(INCOMPLETE)
 
@@ -260,6 +271,7 @@ def _modes(point: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _show_modes(model: ReducedModel, document: list[dict[str, Any]]) -> None:
+    from ..modal.parametric.problem import NOT_KNOWN
     from .tables import table
 
     rows: list[list[str]] = []
@@ -269,6 +281,8 @@ def _show_modes(model: ReducedModel, document: list[dict[str, Any]]) -> None:
                 "unstable": mode["unstable"],
                 "error above the bound": not mode["passed"],
                 "outside the box": not point["inside"],
+                "does not hold": point.get("unlike", NOT_KNOWN) != NOT_KNOWN,
+                "who touches is not known": point.get("unlike") == NOT_KNOWN,
                 f"corrected {point['corrections']} ×": point["corrections"],
             }
             rows.append(

@@ -46,7 +46,8 @@ QUICK = 1  # compression: half the time of the usual 6, a tenth larger
 
 _NUMBERS = ("frequency", "constant", "bound", "solves", "whole")
 _ARRAYS = ("vectors", "projected", "right_sketch", "left_sketch")
-_OF_CONTACTS = {"terms", "parameters", "elimination", "notes", "elsewhere", "touching"}
+# A file has no case to look at: of points outside the box its model says that it does not know who touches there.
+_OF_CONTACTS = {"terms", "parameters", "elimination", "notes", "elsewhere", "touching", "looked"}
 _NAMED = {"problem", "seconds", "states", *_NUMBERS, *_ARRAYS}
 
 

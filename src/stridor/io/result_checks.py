@@ -172,6 +172,7 @@ _AT_POINTS = {
     **{name: _Rule(("point", "mode"), "i", 0, 1) for name in ("unstable", "passed")},
     "inside": _Rule(("point",), "i", 0, 1),
     "corrections": _Rule(("point",), "i", 0),
+    "unlike": _Rule(("point",), "O", needed=False),
 }
 _CYCLE, _CYCLE_CONTACT = ("cycle", "sample"), ("cycle", "sample", "contact")
 _CYCLES = {

@@ -176,14 +176,39 @@ def joined_onsets(
 
 
 def jumps(before: Sequence[complex], after: Sequence[complex]) -> tuple[list[complex], list[complex]]:
-    """Growing modes that there are only after a border, and only before it."""
+    """Growing modes that there are only after a border, and only before it, so that as many more eigenvalues grow
+    behind it as these say: a mode that oscillates is a pair of them, and the same as one real root in no case, but as
+    two that both are near it."""
     mine, theirs = np.array(before, dtype=complex), np.array(after, dtype=complex)
-    pairs = matched(mine, theirs)
-    ours, others = {i for i, _ in pairs}, {j for _, j in pairs}
+    ours: set[int] = set()
+    others: set[int] = set()
+    for oscillates in (True, False):
+        pairs = matched(_only(mine, oscillates=oscillates), _only(theirs, oscillates=oscillates))
+        ours |= {i for i, _ in pairs}
+        others |= {j for _, j in pairs}
+    _parted(mine, ours, theirs, others)
+    _parted(theirs, others, mine, ours)
     return (
         [complex(v) for j, v in enumerate(theirs) if j not in others],
         [complex(v) for i, v in enumerate(mine) if i not in ours],
     )
+
+
+def _parted(values: ComplexArray, known: set[int], found: ComplexArray, beside: set[int]) -> None:
+    """Match pairs with two real roots each that both are near them; known and beside: what has its match, of each."""
+    for i in np.flatnonzero(values.imag).tolist():
+        rest = [j for j in np.flatnonzero(found.imag == 0.0).tolist() if j not in beside]
+        near = [j for j in rest if matched(values[[i]], found[[j]])]
+        if i not in known and len(near) >= 2:
+            known.add(i)
+            beside |= set(near[:2])
+
+
+def _only(values: ComplexArray, *, oscillates: bool) -> ComplexArray:
+    """Eigenvalues (k,) with NaN in place of those that do not oscillate, or of those that do."""
+    chosen = values.copy()
+    chosen[(values.imag != 0.0) != oscillates] = complex(np.nan, np.nan)
+    return chosen
 
 
 def _jump(

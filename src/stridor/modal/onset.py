@@ -59,8 +59,10 @@ class Onset(Shown):
 
     @property
     def roots(self) -> int:
-        """By how many more eigenvalues grow beyond it: a flutter pair is two, a motion that diverges one."""
-        return (-1 if self.stabilising else 1) * (1 if self.kind == "divergence" else 2)
+        """By how many more eigenvalues grow beyond it: what oscillates is a pair, what diverges is one, also where that
+        begins because other nodes touch."""
+        alone = self.kind == "divergence" or (self.kind == "contact" and self.frequency_hz == 0.0)
+        return (-1 if self.stabilising else 1) * (1 if alone else 2)
 
     def branch_words(self, between: str) -> str:
         """The modes that meet, or the one that diverges; a dash where branches were not followed."""

@@ -12,6 +12,7 @@ from ..agreement.four_answers import four_answers, with_answers
 from ..asking import FUNCTION, STORE, SWITCH, SWITCH_OR_NONE, TABLE, takes
 from ..errors import CaseError, StridorError
 from ..periodic import Cycle, CycleOnset
+from ..temporal.ended import ended
 from ..temporal.trajectory import Trajectory
 from . import analyses
 from .asked import names_of
@@ -109,10 +110,7 @@ def other_in_time(work: Workspace) -> str:
     compliance = work.structured("compare").contact_nodes().compliance
     if settings_of(work).contact == "rigid" and np.any(compliance > 0.0):
         return "contact in time is another than theirs (temporal.contact)"
-    factors: dict[str, float] = {}
-    for phase in phases_of(work):
-        factors |= {**phase.loads, **phase.velocities, **phase.displacements}
-    if off := [name for name, factor in factors.items() if factor != 1.0]:
+    if off := list(ended(work.structured("compare"), phases_of(work)).off):
         return f"they go with full loads and speeds, and the run ends with others ({off[0]})"
     return ""
 

@@ -10,14 +10,13 @@ import numpy as np
 from ..agreement.comparison import NEAR
 from ..errors import StridorError
 from ..modal.results import ComplexModes
-from ..sliding import slip_speeds
 from ..system import System
+from ..temporal.ended import ended
 from ..typing import Array, BoolArray, IntArray
 from .analyses import modes
 from .ensemble_result import NOT_KNOWN, ModalMap
+from .settings import phases_of
 from .workspace import Workspace
-
-SAME = 1e-12  # relative: coefficients of contacts that are one
 
 
 @dataclass(frozen=True)
@@ -69,20 +68,24 @@ class UnstableMap:
 def unstable_modes(
     work: Workspace, mus: Sequence[float], speeds: Sequence[float], loads: Sequence[float]
 ) -> UnstableMap:
-    """What grows at each μ, at each speed where friction depends on it, and at each load where anything does. Where
-    that cannot be told, why not."""
-    system = work.system()
+    """What grows at each μ, at each speed and at each load where modes depend on them, in the phase that runs end with,
+    of which no ramp is looked at. Where that cannot be told, why not."""
+    state = ended(work.system(), phases_of(work))
+    try:
+        system = state.of(work.system())
+    except StridorError as error:
+        return UnstableMap(1.0, {}, (f"no modal map: {error}",))
     constant = all(c.law.constant for c in system.contacts) and all(s.law.constant for s in system.surfaces)
-    values, own = np.unique(mus), np.unique([1.0]) if constant else np.unique(speeds)
+    values, own = np.unique(mus), np.unique(speeds) if _speeds_matter(work, system, constant) else np.unique([1.0])
     matter = not constant or _loads_matter(system, prestress=work.options.prestress)
     factors = [float(f) for f in np.unique(loads)] if matter else [1.0]
     shown = 1.0 if 1.0 in factors else factors[0]
     found: dict[float, tuple[ModalMap, tuple[tuple[UnstableModes, ...], ...]]] = {}
-    notes: list[str] = []
+    notes: list[str] = [state.note] if state.note else []
     for factor in factors:
         at = "" if factors == [1.0] else f" at {factor:g} times the loads"
         try:
-            found[factor], said = _of_load(work, system, values, own, factor)
+            found[factor], said = _of_load(work, values, own, factor)
         except StridorError as error:
             notes.append(f"no modal map{at}: {error}")
         else:
@@ -93,6 +96,14 @@ def unstable_modes(
             "each member are of the modes at its own"
         )
     return UnstableMap(shown, found, tuple(notes), matter)
+
+
+def _speeds_matter(work: Workspace, system: System, constant: bool) -> bool:
+    """Whether modes at one μ may depend on a factor of all velocities: by the law, by damping that friction makes
+    across the slip, and, where that decides which nodes touch, by what motions drag with."""
+    motion, several = system.motion, system.contact_nodes().count > 1
+    drags = bool(np.any(motion.damping @ motion.full)) and (several or bool(system.contact_cubic))
+    return not constant or work.options.friction_damping or drags
 
 
 def _loads_matter(system: System, *, prestress: bool) -> bool:
@@ -106,15 +117,14 @@ def _loads_matter(system: System, *, prestress: bool) -> bool:
 
 
 def _of_load(
-    work: Workspace, system: System, values: Array, speeds: Array, load: float
+    work: Workspace, values: Array, speeds: Array, load: float
 ) -> tuple[tuple[ModalMap, tuple[tuple[UnstableModes, ...], ...]], list[str]]:
     """The map at one factor of all loads, what grows at its points, and what is to be said."""
     columns: list[list[UnstableModes]] = []
     solved: list[BoolArray] = []
     notes: list[str] = []
     for speed in speeds:
-        at_speed, friction = _at_speed(work, system, values, float(speed))
-        found = modes(at_speed if load == 1.0 else at_speed.under(load), mu=friction)
+        found = modes(work.ending(load, float(speed)), mu=values)
         columns.append([_growing(found, i) for i in range(len(values))])
         solved.append(found.solved)
         notes += [said for said, known in zip(found.completeness, found.solved, strict=False) if not known]
@@ -123,24 +133,6 @@ def _of_load(
     count[~np.column_stack(solved)] = NOT_KNOWN
     fastest = np.array([[_fastest(g) for g in row] for row in growing])
     return (ModalMap(values, speeds, count, fastest[..., 0], fastest[..., 1], load), growing), notes
-
-
-def _at_speed(work: Workspace, system: System, mus: Array, speed: float) -> tuple[Workspace, Array]:
-    """The case with its supports at another speed, and the friction coefficients that its laws have there."""
-    if speed == 1.0:
-        return work, mus
-    case = work.case("the modal map of friction that depends on speed")
-    changes = {
-        f"supports.{name}.velocity.{direction}": speed * value
-        for name, support in case.supports.items()
-        for direction, value in support.velocity.items()
-    }
-    full = np.abs(slip_speeds(system, system.motion.full))
-    laws = [(c.law, float(v)) for c, v in zip(system.contacts, full, strict=True)]
-    coefficients = np.array([[law.scaled(float(mu), v).sliding(speed * v) for law, v in laws] for mu in mus])
-    if not laws or np.ptp(coefficients, axis=1).max() > SAME * np.abs(coefficients).max():
-        raise StridorError("friction depends on speed, and contacts that slide at several speeds have no common one")
-    return Workspace(case.with_(changes)), coefficients[:, 0]
 
 
 def _growing(found: ComplexModes, i: int) -> UnstableModes:

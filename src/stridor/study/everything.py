@@ -19,6 +19,7 @@ from ..modal.onsets import Onsets
 from ..sliding import anything_acts
 from ..sliding.result import SteadySliding
 from ..system import System
+from ..temporal.ended import ended
 from ..temporal.shapes import operating_shape
 from ..temporal.simulate import Progress
 from ..temporal.trajectory import Trajectory
@@ -201,7 +202,8 @@ def compute_everything(
     temporal = _Temporal(work, parts, clock, progress, keep, before, kept, notes)
     run = None if mu is not None else temporal.run()
     summary = None if run is None else analyses.summarise(work, run)
-    still = None if run is None else unsaturated(work, run, modal.own)
+    answering = None if run is None else _answering(work, run, modal.own, notes)
+    still = None if run is None else unsaturated(work, run, answering)
     if still is not None and summary is not None:
         summary = replace(summary, dominant_frequency_hz=None, stronger_below_hz=None)
     shape, mode, operating, agreement = _shape(system, modal), _eigenvalue(modal), None, None
@@ -209,7 +211,7 @@ def compute_everything(
         agreement = _or_note(lambda: temporal.compare(run, growing=still is not None), notes, "no comparison")
         through = modal.cheap and (agreement is None or not agreement.interrupted)
         if through and run is not None and summary is not None and still is None:
-            shapes = lambda: _shapes(work, modal.own, run, summary)  # noqa: E731
+            shapes = lambda: _shapes(work, answering, run, summary)  # noqa: E731
             found = clock.part("compare", "shapes", shapes, "shapes", wanted="compare" in parts)
             operating, shape, mode = found or (None, shape, mode)
     return Everything(
@@ -244,6 +246,22 @@ def compute_everything(
         taken=tuple(clock.taken),
         taken_parts={name: tuple(w for w in what if w) for name, what in clock.taken.items()},
     )
+
+
+def _answering(work: Workspace, run: Trajectory, own: ComplexModes | None, notes: list[str]) -> ComplexModes | None:
+    """The modes that a run is held against: those at the friction of the case, of the steady sliding that the run ends
+    with; None where that is none, or still changes."""
+    state = ended(work.system(), analyses.phases_of(work))
+    if own is None or run.interrupted or not (state.words or state.moving):
+        return own
+    if moving := state.still_moving():
+        notes.append(f"the run is held against no mode: {moving}")
+        return None
+    if not state.words:
+        return own
+    notes.append(f"beside the run, {state.note}")
+    mu = work.own_friction
+    return _or_note(lambda: analyses.modes(work.ending(), mu, vectors="right"), notes, "no modes beside the run")
 
 
 def _own_friction(work: Workspace) -> float | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -28,11 +28,12 @@ from ..sliding.stretches import (
 from ..system import System, build_system
 from ..system.imported import ImportedTerm
 from ..system.shares import system_shares
+from ..typing import IntArray
 from .workspace import Problem, Workspace
 
 if TYPE_CHECKING:
     from ..modal.parametric import Parameter, ReducedModel
-    from ..modal.parametric.contacts import ContactsProblem
+    from ..modal.parametric.contacts import ContactsProblem, ParametricSystems
     from ..modal.parametric.family import FactoredPart
     from ..modal.parametric.problem import Role
 
@@ -73,7 +74,7 @@ def reduced_model(
 
     case = Workspace.of(problem).case("a reduced model")
     found, limit = parametric_problem(case, box, held_at=held_at), _limit(case, max_frequency_hz)
-    solver = None if case.modal.solver == "auto" else case.modal.solver
+    solver = _solver(case)
     try:
         return reduce(found, limit, bound=bound, solver=solver)
     except AnalysisError as error:
@@ -101,7 +102,7 @@ def stretches_of(case: Case, name: str, between: tuple[float, float]) -> tuple[S
     """The stretches of a number of the case, as a box calls it, in which the same nodes touch."""
     _parameters(case, {name: between})  # raises for what is none
     numbers = Numbers(case, {name: between})
-    solver = None if case.modal.solver == "auto" else case.modal.solver
+    solver = _solver(case)
     if name == MU and not numbers.named_in_factors:
         return stretches(numbers.own, *between, solver=solver)
     return stretches_along(
@@ -118,7 +119,7 @@ def parametric_problem(
 ) -> ContactsProblem:
     """The matrices of a case as sums of terms in the numbers of a box, as `reduced_model` takes it."""
     from ..modal.options import Options
-    from ..modal.parametric.contacts import FRICTION, STIFFNESS, ParametricSystems, contacts_problem
+    from ..modal.parametric.contacts import FRICTION, STIFFNESS, contacts_problem
 
     parameters = _parameters(case, box)
     numbers = Numbers(case, box)
@@ -128,15 +129,8 @@ def parametric_problem(
             if name in box and name not in elsewhere:
                 why = "the case has no contacts and no factor that names it, so that nothing depends on it"
                 raise CaseError(f"box.{name}", None, f"{why}; take another number")
-    exact = {FRICTION, STIFFNESS, *case.parameters}
     settings = case.modal
-    family = ParametricSystems(
-        numbers.own if held_at is None else numbers.pressed(held_at),
-        numbers.system,
-        numbers.structure,
-        parameters,
-        tuple(p for p in parameters if p.name not in exact),
-    )
+    family = _family(case, numbers, parameters, numbers.own if held_at is None else numbers.pressed(held_at))
     solver = None if settings.solver == "auto" else settings.solver
     friction = next((p for p in parameters if p.name == FRICTION), None)
     if held_at is not None:
@@ -155,14 +149,98 @@ def parametric_problem(
         # Where steady states are solved for, the problem has told of what it holds.
         where = _elsewhere(case, box, numbers, problem)
         said = (*said, *where)
-    return replace(problem, notes=said if settings.damped else (*said, DAMPED), elsewhere=where)
+    notes = said if settings.damped else (*said, DAMPED)
+    return replace(problem, notes=notes, elsewhere=where, looked=_Looked(case, box, problem))
+
+
+def _family(
+    case: Case, numbers: Numbers, parameters: tuple[Parameter, ...], own: System
+) -> ParametricSystems:
+    """The systems over parameters, of which own says which nodes touch."""
+    from ..modal.parametric.contacts import FRICTION, STIFFNESS, ParametricSystems
+
+    exact = {FRICTION, STIFFNESS, *case.parameters}
+    interpolated = tuple(p for p in parameters if p.name not in exact)
+    return ParametricSystems(own, numbers.system, numbers.structure, parameters, interpolated)
+
+
+class _Looked:
+    """At which points a problem does not hold, in words, each looked at once. Systems are built when they are asked
+    for: a model outlives them."""
+
+    def __init__(self, case: Case, box: Mapping[str, tuple[float, float]], problem: ContactsProblem) -> None:
+        self._case, self._box, self._problem = case, dict(box), problem
+        self._known: dict[tuple[tuple[str, float], ...], str] = {}
+
+    def __call__(self, points: Sequence[Mapping[str, float]]) -> tuple[str, ...]:
+        keys = [_key(point) for point in points]
+        new = {key: point for key, point in zip(keys, points, strict=True) if key not in self._known}
+        if new:
+            self._look(new)
+        return tuple(self._known[key] for key in keys)
+
+    def _look(self, new: Mapping[tuple[tuple[str, float], ...], Mapping[str, float]]) -> None:
+        from ..modal.parametric.contacts_steady import unlike_at
+
+        numbers, problem = Numbers(self._case, self._box), self._problem
+        touching = np.zeros(0, dtype=bool) if problem.touching is None else problem.touching
+        held, points = np.flatnonzero(touching), _by_system(new.values())
+        same = [at for at in points if numbers.system(at).contact_nodes().count == len(touching)]
+        found = unlike_at(numbers.system, held, same, _solver(self._case)) if len(touching) else []
+        self._known |= {key: "others can touch" for key in new}
+        self._known |= {_key(at): "" for at in same} | {_key(at): words for at, words in found}
+        for at in same:
+            # In the box the problem was refused for these.
+            if not self._known[_key(at)] and not problem.inside(at):
+                self._known[_key(at)] = _slides_unlike(numbers, held, at) or self._deviates(numbers, held, at)
+
+    def _deviates(self, numbers: Numbers, held: IntArray, at: Mapping[str, float]) -> str:
+        """Words on that the matrices are no longer what they are made of in the box."""
+        from ..modal.parametric.contacts import deviates
+        from ..modal.parametric.family import EXACT
+
+        family = _family(self._case, numbers, self._problem.parameters, numbers.own)
+        if all(p.low <= at[p.name] <= p.high for p in family.interpolated):
+            return ""
+        off = deviates(family, held, at)
+        return f"the model's matrices are off by {off:.1e} there" if off > 10 * EXACT else ""
+
+
+def _key(point: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
+    return tuple(sorted(point.items()))
+
+
+def _solver(case: Case) -> str | None:
+    return None if case.modal.solver == "auto" else case.modal.solver
+
+
+def _by_system(points: Iterable[Mapping[str, float]]) -> list[Mapping[str, float]]:
+    """Points of one system, which differ in friction and contact stiffness alone, one after the other."""
+    from ..modal.parametric.contacts_steady import FRICTION, STIFFNESS
+
+    return sorted(points, key=lambda at: [value for name, value in at.items() if name not in (FRICTION, STIFFNESS)])
+
+
+def _slides_unlike(numbers: Numbers, held: IntArray, at: Mapping[str, float]) -> str:
+    """Words on that nodes that touch slide the other way than in the case as it is, or not at all, and on that rigid
+    contact does not determine sliding; "" where all is as it is there."""
+    from ..modal.options import Options
+    from ..modal.painleve import steps_undetermined
+    from ..modal.parametric.contacts_steady import contacts_of
+
+    system = numbers.system(at)
+    own, there = (contacts_of(one, held).sense[held] for one in (numbers.own, system))
+    slides = np.any(own != 0.0, axis=1)
+    if turned := int(np.sum(slides & (np.sum(own * there, axis=1) <= 0.0))):
+        return f"{turned} of {len(held)} touching nodes do not slide in the direction that they are held with"
+    return "rigid contact does not determine the motion" if steps_undetermined(system, at.get(MU), Options()) else ""
 
 
 def _elsewhere(
     case: Case, box: Mapping[str, tuple[float, float]], numbers: Numbers, problem: ContactsProblem
 ) -> tuple[str, ...]:
     """Where in a box others than the nodes that a problem holds touch, in words."""
-    from ..modal.parametric.contacts_steady import FRICTION, STIFFNESS, unlike_at
+    from ..modal.parametric.contacts_steady import unlike_at
 
     if problem.touching is None:
         return ()
@@ -170,10 +248,8 @@ def _elsewhere(
     if len(box) == 1 and (MU in box or numbers.own.size <= ENCLOSED):
         ((name, between),) = box.items()
         return elsewhere_words(stretches_of(case, name, between), "μ" if name == MU else name)
-    solver = None if case.modal.solver == "auto" else case.modal.solver
-    points = _looked_at(problem, small=numbers.own.size <= MOST)
-    # Those of one system, which differ in friction and contact stiffness alone, one after the other.
-    points.sort(key=lambda point: [value for name, value in point.items() if name not in (FRICTION, STIFFNESS)])
+    solver = _solver(case)
+    points = _by_system(_looked_at(problem, small=numbers.own.size <= MOST))
     held = np.flatnonzero(problem.touching)
     others = unlike_at(numbers.system, held, points, solver)
     if not others:

@@ -15,10 +15,12 @@ from ..notebook import Shown
 from ..sliding import full_motion, slip_speeds
 from ..temporal.attractor import settled_contacts
 from ..temporal.changes import changes_of
+from ..temporal.ended import ended
 from ..temporal.energy import EnergyBalance, energy_balance
 from ..temporal.growth import Growth
 from ..temporal.signals import components
 from ..temporal.trajectory import RUN, Trajectory
+from .settings import phases_of
 from .workspace import Problem, Workspace
 
 EXPONENTIAL = 0.5  # rms of ln amplitude about the fitted line, above which nothing is called exponential
@@ -143,8 +145,10 @@ def summarise(problem: Problem, run: Trajectory) -> RunSummary:
     linear: complex | None = None
     perturbed = work.temporal.initial == "steady-sliding" and work.temporal.perturbation > 0
     if perturbed and len(run.time) >= LEAST_RECORDS and run.contact_names and _of_points(work, run):
+        # In the first phase, from whose steady sliding the run starts; what follows is no small motion about that.
         system = work.system()
-        steady = slip_speeds(system, full_motion(system))
+        first = ended(system, phases_of(work), 0).motions
+        steady = slip_speeds(system, full_motion(system) if system.load_steps else system.motion.full * first)
         found = linear_part(run.slip_speed - steady, steady, skip=16)
         linear = components(found, run.sampling, max_frequency_hz=limit).fastest or None
     below = None if dominant is None else stronger_below(run, limit)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
-from dataclasses import replace
 from functools import cached_property, lru_cache, partial
 from os import PathLike
 from typing import Any
@@ -31,10 +30,12 @@ from ..sliding.result import SteadySliding
 from ..sliding.solution import steady_nodes
 from ..system import System, build_system
 from ..system.model import AnswerCache
+from ..temporal.ended import ended
 from ..temporal.inputs import unfit_in_time
 from ..typing import Array
 from .case_key import case_key
 from .options import options_of
+from .settings import phases_of
 
 SYSTEMS = 16  # kept at the same time, of a case whose matrices depend on μ
 KEPT_BY = "`modes`, `steady` and `simulate` without μ answer with each contact's own"
@@ -121,12 +122,16 @@ class Workspace(Shown):
         Raises what `build_system` raises."""
         return self._build(None if mu is None or not self.varies else float(mu))
 
-    def under(self, factor: float) -> Workspace:
-        """The same under ``factor`` times all loads, with answers of its own."""
+    def ending(self, load: float = 1.0, speed: float = 1.0) -> Workspace:
+        """The same in the steady sliding that a run through its phases ends with (`temporal.ended`), with ``load``
+        times all loads and ``speed`` times all velocities of these, and answers of its own where that is another. A
+        friction coefficient asked for is that at full velocities."""
+        if load == speed == 1.0 and not ended(self.system(), phases_of(self)).words:
+            return self
 
         def built(mu: float | None) -> System:
             system = self._build(mu)
-            return replace(system, loads={name: factor * vector for name, vector in system.loads.items()})
+            return ended(system, phases_of(self)).of(system, load, speed)
 
         other = copy(self)
         other.__dict__.pop("slides", None)  # the one property kept that loads decide

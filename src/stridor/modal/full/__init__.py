@@ -8,6 +8,6 @@ range, `onsets` and `modes` the analyses.
 
 from .modes import full_modes
 from .onsets import full_onsets
-from .parametric_onsets import ParametricOnset, ParametricOnsets, onsets_along
+from .parametric_onsets import ParametricOnset, ParametricOnsets, onsets_along, unlike_along
 
-__all__ = ["ParametricOnset", "ParametricOnsets", "full_modes", "full_onsets", "onsets_along"]
+__all__ = ["ParametricOnset", "ParametricOnsets", "full_modes", "full_onsets", "onsets_along", "unlike_along"]

@@ -24,6 +24,8 @@ from ..newton import Root, crossing, meeting, standstill
 from ..onset import Onset, from_above
 from ..options import Options
 from ..parametric import ReducedModel
+from ..parametric.contacts_steady import FRICTION, STIFFNESS
+from ..parametric.problem import NOT_KNOWN
 from ..tables import ONSET
 from .branches import ends_of
 from .counted import ends as turns
@@ -38,6 +40,8 @@ COLUMNS = (
     "stabilising",
 )  # fmt: skip
 ELSEWHERE = "other nodes touch at some of these values (see the note), and modes there are other ones"
+LOOKS, FEWER = 9, 3  # values of a line at which it is looked who touches, of small models and of larger ones
+SMALL = 8000  # freedoms
 NEAR = 1e-3  # of the range and of λ: how far from the reduced model's onset the full problem's may be
 
 
@@ -258,7 +262,10 @@ def onsets_along(
         lost = ", ".join(f"{line.value(o.mu):.6g} ({o.frequency_hz:.6g} Hz)" for o, found in tried if found is None)
         complete, said = False, f"Not confirmed in the full problem and left out: {parameter} = {lost}. {said}"
     # Of a mode with other nodes in contact nothing was sought.
-    if getattr(model.problem, "elsewhere", ()):
+    others = unlike_along(model, parameter, point)
+    if others:
+        complete, said = False, f"Not complete: {others}. {said}"
+    elif getattr(model.problem, "elsewhere", ()):
         complete, said = False, f"Not complete: {ELSEWHERE}. {said}"
     listed = sorted(onsets, key=lambda o: o.value)
     return ParametricOnsets.of(listed, model, parameter, complete=complete, sentence=said)
@@ -313,3 +320,26 @@ def _roots(
     yield meeting(full, s, lam, x, y, between)
 
 
+def unlike_along(model: ReducedModel, parameter: str, fixed: Mapping[str, float] | None = None) -> str:
+    """Words on that the model does not hold somewhere on the line of `onsets_along`, or that it is not
+    known; "" where they do not. Of a box of one number, and of what is dear inside of it, `elsewhere` tells."""
+    point = model.problem.point(fixed or {})
+    problem, cheap = model.problem, parameter in (FRICTION, STIFFNESS)
+    (own,) = (p for p in problem.parameters if p.name == parameter)
+    inside = problem.inside(point)
+    if inside and (len(problem.parameters) == 1 or not (cheap or problem.size <= SMALL)):
+        return ""
+    count = LOOKS if cheap or problem.size <= SMALL else FEWER
+    places = [{**point, parameter: float(value)} for value in np.linspace(own.low, own.high, count)]
+    said = [(at, words) for at, words in zip(places, model.unlike(places), strict=True) if words]
+    if not said:
+        return ""
+    others = ", ".join(f"{name} = {value:.6g}" for name, value in point.items() if name != parameter)
+    if all(words == NOT_KNOWN for _, words in said):
+        return f"{others} lies {NOT_KNOWN}"
+    at, words = said[0]
+    where = f"{parameter} = {at[parameter]:.4g}" + (f", {others}" if others else "")
+    return (
+        f"the model does not hold at {len(said)} of {count} values that were looked at, such as {where} ({words}), and "
+        "modes there are other ones"
+    )

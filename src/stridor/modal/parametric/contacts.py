@@ -11,8 +11,8 @@ steady sliding adds (`contacts_steady`) are further terms, and rigid contact is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ import scipy.sparse as sp
 from ...case.usual import MOST_FRICTION, TOO_MUCH
 from ...errors import CaseError, NotReducibleError
 from ...system import System
-from ...typing import BoolArray, Sparse
+from ...typing import BoolArray, IntArray, Sparse
 from ..krylov.steady import contact_rows, refuse_stick, steadiness, touching_nodes
 from ..options import Options
 from .contacts_determined import refuse_undetermined_in
@@ -29,8 +29,8 @@ from .contacts_rigid import Elimination, eliminate
 from .contacts_sampling import Values
 from .contacts_steady import FRICTION, STIFFNESS, Contacts, contacts_of, steady_terms
 from .factors import ParameterFactor, Product
-from .family import FactoredPart, deviation, interpolated_terms
-from .problem import Parameter, ParametricProblem
+from .family import FactoredPart, deviation, extrapolated, interpolated_terms
+from .problem import NOT_KNOWN, Parameter, ParametricProblem
 
 SAME = 1e-13  # rows of rigid contact, of their largest entry
 
@@ -41,13 +41,28 @@ class ContactsProblem(ParametricProblem):
 
     elimination: how rigid contact was taken out of it, which leaves fewer freedoms than the system has; None where
     there is none. notes: sentences on what its user should know; elsewhere: those of them on values at which other
-    nodes touch, which nothing of the problem holds for. touching (m,): which of the contact nodes it holds.
+    nodes touch, which nothing of the problem holds for. touching (m,): which of the contact nodes it holds. looked:
+    says of points why it does not hold there, as `unlike` has it; None where nobody can solve for steady sliding, as
+    in a model from a file.
     """
 
     elimination: Elimination | None = None
     notes: tuple[str, ...] = ()
     elsewhere: tuple[str, ...] = ()
     touching: BoolArray | None = None
+    looked: Callable[[Sequence[Values]], tuple[str, ...]] | None = field(default=None, compare=False, repr=False)
+
+    def unlike(self, points: Sequence[Mapping[str, float]]) -> tuple[str, ...]:
+        """Of each point, in the box or not, words on why the problem does not hold there: others touch in steady
+        sliding than the nodes that are held, they slide in another way, or its matrices are others outside the box; or
+        on that this is not known. "" where it holds."""
+        full = [self.point(values) for values in points]
+        if self.looked is not None:
+            return self.looked(full)
+        if self.touching is None:
+            return ("",) * len(full)
+        # Of the box `elsewhere` tells, which was looked at when the model was made.
+        return tuple("" if self.inside(values) else NOT_KNOWN for values in full)
 
     @property
     def idle_words(self) -> tuple[str, ...]:
@@ -153,6 +168,18 @@ def contacts_problem(
         refuse_undetermined_in(terms, family.parameters, (normal, slide), friction, own, options.solver)
         terms = elimination.applied(terms)
     return ContactsProblem(terms, family.parameters, elimination, notes, notes, steady.active)
+
+
+def deviates(family: ParametricSystems, touching: IntArray, values: Values) -> float:
+    """How far, relative to the largest entry, the matrices that a problem over a family has at values outside its box
+    are from those of the system there; what steady sliding adds is not looked at."""
+    varied = any(p.name == FRICTION for p in family.parameters)
+
+    def pieces_at(at: Values) -> Mapping[str, FactoredPart]:
+        contacts = contacts_of(family.system_at(at), touching)
+        return {**family.structure_at(at), **_springs(contacts, varied=varied)}
+
+    return extrapolated(pieces_at, family.interpolated, values)
 
 
 def _springs(contacts: Contacts, *, varied: bool) -> dict[str, FactoredPart]:

@@ -60,6 +60,18 @@ def interpolated_terms(pieces_at: Pieces, parameters: tuple[Parameter, ...]) -> 
     return merged(terms)
 
 
+def extrapolated(pieces_at: Pieces, parameters: tuple[Parameter, ...], values: Mapping[str, float]) -> float:
+    """How far, of the largest entry, mass, damping or stiffness of `interpolated_terms` are at values outside
+    the ranges from what ``pieces_at`` gives there."""
+    terms, pieces = interpolated_terms(pieces_at, parameters), pieces_at(values).values()
+    worst = 0.0
+    for role in sorted({part.role for part in pieces}):
+        ours = sum((t.factor(values) * t.matrix for t in terms if t.role == role), start=0.0)
+        truth = sum((part.factor(values) * part.matrix for part in pieces if part.role == role), start=0.0)
+        worst = max(worst, deviation(ours, truth))
+    return worst
+
+
 def _interpolated(
     piece: FactoredPart, matrix_at: Callable[[Mapping[str, float]], Sparse], parameters: tuple[Parameter, ...]
 ) -> list[Term]:

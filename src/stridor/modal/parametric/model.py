@@ -196,6 +196,11 @@ class ReducedModel(Shown):
         factors = self.problem.factors(self.problem.point(modes.point))
         return self._judged(modes, assembled(self.projected, factors, self.problem.powers), factors)
 
+    def unlike(self, points: Sequence[Mapping[str, float]]) -> tuple[str, ...]:
+        """`ContactsProblem.unlike`; "" of each point of problems without contacts."""
+        asked = getattr(self.problem, "unlike", None)
+        return ("",) * len(points) if asked is None else asked(points)
+
     def expand(self, modes: ReducedModes, *, left: bool = False) -> ComplexArray:
         """Right or left vectors (n, k) of unit length."""
         x: ComplexArray = combined(self.vectors, modes.left if left else modes.right).astype(complex)

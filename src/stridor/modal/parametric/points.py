@@ -14,7 +14,9 @@ from ...tabular import MODE, Rows, Tabular, dataset, mode_cells
 from ...typing import Array, BoolArray, IntArray
 from .correct import CorrectedModes, Corrector
 from .model import ReducedModel, ReducedModes
+from .problem import NOT_KNOWN
 
+NAMED = 3  # points, at most
 OF_MODES = ("frequency_hz", "growth_rate", "unstable", "error", "passed", "residual")
 
 
@@ -22,7 +24,9 @@ OF_MODES = ("frequency_hz", "growth_rate", "unstable", "error", "passed", "resid
 class ModesAtPoints(Tabular, Shown):
     """Modes at points (p,): parameters, their names, and values (p, n) there. frequency_hz [Hz], growth_rate [1/s],
     error (relative, estimated) and residual (p, m), NaN where a point has fewer modes than others; unstable, passed
-    (error below the model's bound) (p, m). inside (p,): whether in the model's box; corrections (p,): steps taken."""
+    (error below the model's bound) (p, m). inside (p,): whether in the model's box; corrections (p,): steps taken.
+    unlike: of each point why the model does not hold there, in words, as where others touch than the nodes that it
+    holds, or that this is not known; "" where it holds, and none of it where nobody looked."""
 
     parameters: tuple[str, ...]
     values: Array
@@ -35,6 +39,7 @@ class ModesAtPoints(Tabular, Shown):
     inside: BoolArray
     corrections: IntArray
     provenance: dict[str, Any] = field(default_factory=dict)
+    unlike: tuple[str, ...] = ()
 
     @classmethod
     def of(
@@ -77,10 +82,15 @@ class ModesAtPoints(Tabular, Shown):
             inside=np.array([bool(modes.inside) for modes in found], dtype=bool),
             corrections=np.array([m.steps if isinstance(m, CorrectedModes) else 0 for m in found], dtype=np.int64),
             provenance=dict(provenance or {}),
+            unlike=model.unlike([modes.point for modes in found]),
         )
 
     def __len__(self) -> int:
         return len(self.values)
+
+    def unlike_words(self) -> tuple[str, ...]:
+        """A sentence on the points at which the model does not hold; () for none."""
+        return unlike_words(self.parameters, self.values.tolist(), self.unlike)
 
     def counts(self) -> list[int]:
         """How many modes each point has."""
@@ -92,6 +102,7 @@ class ModesAtPoints(Tabular, Shown):
             {
                 "point": dict(zip(self.parameters, self.values[k].tolist(), strict=True)),
                 "inside": bool(self.inside[k]),
+                **({"unlike": self.unlike[k]} if self.unlike and self.unlike[k] else {}),
                 "corrections": int(self.corrections[k]),
                 **{name: getattr(self, name)[k, :count].tolist() for name in OF_MODES},
             }
@@ -99,8 +110,10 @@ class ModesAtPoints(Tabular, Shown):
         ]
 
     def table(self) -> Rows:
-        """Heads and rows, as reduced.csv has them: one for each mode of each point, columns of the parameters first."""
-        heads = (*self.parameters, *MODE, "error", "residual", "inside", "corrections")
+        """Heads and rows, as reduced.csv has them: one for each mode of each point, columns of the parameters first; a
+        column ``unlike`` where others touch at some of them."""
+        more = ("unlike",) if any(self.unlike) else ()
+        heads = (*self.parameters, *MODE, "error", "residual", "inside", "corrections", *more)
         return heads, [
             (
                 *self.values[k].tolist(),
@@ -108,6 +121,7 @@ class ModesAtPoints(Tabular, Shown):
                     float(self.frequency_hz[k, m]), float(self.growth_rate[k, m]), unstable=bool(self.unstable[k, m])
                 ),
                 float(self.error[k, m]), float(self.residual[k, m]), bool(self.inside[k]), int(self.corrections[k]),
+                *((self.unlike[k],) if more else ()),
             )
             for k, count in enumerate(self.counts())
             for m in range(count)
@@ -136,4 +150,22 @@ class ModesAtPoints(Tabular, Shown):
             "corrections": (("point",), self.corrections),
         }
         names = {"number": ("number", np.array(self.parameters, dtype=object))}
+        if any(self.unlike):
+            variables["unlike"] = (("point",), np.array(self.unlike, dtype=object))
         return dataset("reduced modes", variables, names, self.provenance)
+
+
+def unlike_words(names: Sequence[str], values: Sequence[Sequence[float]], unlike: Sequence[str]) -> tuple[str, ...]:
+    """A sentence on those of some points (p, n) at which a model does not hold, as ``unlike`` (p,) says of each; ()
+    where it says so of none."""
+    told = [
+        f"{', '.join(f'{name} = {value:.4g}' for name, value in zip(names, at, strict=True))} ({words})"
+        for at, words in zip(values, unlike, strict=False)
+        if words
+    ]
+    if not told:
+        return ()
+    rest = f" and {len(told) - NAMED} more" if len(told) > NAMED else ""
+    known = any(words and words != NOT_KNOWN for words in unlike)
+    have = "`stridor modes` has those there" if known else "given the case file in place of the model it is looked at"
+    return (f"Modes of the model {'do' if known else 'may'} not hold at {'; '.join(told[:NAMED])}{rest}: {have}.",)

@@ -17,6 +17,7 @@ from ..quadratic.problem import Quadratic
 from .factors import Together, is_data
 
 Role = Literal["mass", "damping", "stiffness"]
+NOT_KNOWN = "outside the box, and the model does not know which nodes touch there"
 CORNERS = 3  # parameters up to which all corners of a box are looked at
 POWERS: Mapping[Role, int] = {"mass": 2, "damping": 1, "stiffness": 0}
 
