@@ -8,7 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from stridor.contact.facets import FacetSurface
+from stridor.contact.creases import corners_of, creases, edges_of
+from stridor.contact.facets import CORNER_DEG, FacetSurface
 from stridor.mesh.facets import reference_nodes, shape_functions
 from stridor.study.description import edge_warnings
 
@@ -96,6 +97,41 @@ def test_chamfers_all_round_a_pad_meet_in_edges_too(kind, rows):
     assert not len(surface.doubtful)
 
 
+def one_row(kind, across, along, rows, wide, size=(32.0, 22.0)):
+    """A pad with chamfers of 30° by as much on all sides of a flat of so many facets, in meshes whose diagonals go out
+    of its corners: the surface."""
+    slope = np.tan(np.radians(30.0))
+    x, y = (
+        np.concatenate([np.linspace(-wide, 0, rows + 1)[:-1], np.linspace(0, s, n + 1),
+                        s + np.linspace(0, wide, rows + 1)[1:]])
+        for s, n in zip(size, (across, along), strict=True)
+    )  # fmt: skip
+    xy = np.array([[u, v] for v in y for u in x])
+    off = np.max([-xy[:, 0], xy[:, 0] - size[0], -xy[:, 1], xy[:, 1] - size[1], 0 * xy[:, 0]], axis=0)
+    points, n, cells = np.column_stack([xy, -slope * off]), len(x), []
+    for j, i in itertools.product(range(len(y) - 1), range(n - 1)):
+        a, b, c, d = j * n + i, j * n + i + 1, (j + 1) * n + i + 1, (j + 1) * n + i
+        cells += [[a, b, d], [b, c, d]] if (i < rows) != (j < rows) else [[a, b, c], [a, c, d]]
+    return surface_of(points, np.array(cells), kind)
+
+
+@pytest.mark.parametrize("kind", ["triangle", "triangle6"])
+@pytest.mark.parametrize("rows", [1, 2])
+@pytest.mark.parametrize(("across", "along"), [(1, 1), (3, 1), (1, 3), (5, 1)])
+def test_a_flat_of_one_row_between_chamfers_is_told_by_its_width_or_said(kind, rows, across, along):
+    over = np.array([[x, y, 0.1] for x in (0.1, 7.0, 16.0, 31.9) for y in (0.1, 9.0, 21.9)])
+    narrow = one_row(kind, across, along, rows, 5.0)
+    np.testing.assert_allclose(narrow.locate(over).normal, np.tile([0.0, 0.0, 1.0], (12, 1)), atol=1e-12)
+    assert not len(narrow.doubtful)
+    # Three facets of like widths may be an arc: every edge that is not taken as one is said.
+    like = one_row(kind, across, along, rows, 9.0)
+    edges = edges_of(like.positions, like.blocks)
+    found = creases(edges, corners_of(like.blocks), like.positions, np.radians(CORNER_DEG))
+    turns = np.abs(edges.turn) > np.radians(1.0)
+    assert turns.sum() == 2 * (across + along) + 4 * rows
+    np.testing.assert_array_equal(found.edge | found.doubtful, turns)
+
+
 def bent(kind, around, along, place, *, uneven=0.0, closed=True) -> FacetSurface:
     rng = np.random.default_rng(around)
     u = (np.arange(around + 1) + uneven * rng.uniform(-1, 1, around + 1)) / around
@@ -155,6 +191,17 @@ def fillet(facets, *, tangent: bool):
 
 
 @pytest.mark.parametrize("kind", ["triangle", "quad", "quad8"])
+@pytest.mark.parametrize(("middle", "said"), [(11.0, 4), (15.0, 4), (16.0, 0)])
+def test_three_facets_between_ends_are_edges_where_the_one_amid_is_far_wider(kind, middle, said):
+    slope = 5.0 * np.tan(np.radians(20.0))
+    profile = [(-5.0, -slope), (0.0, 0.0), (middle, 0.0), (middle + 5.0, -slope)]
+    surface = extruded(profile, [0.0, 4.0, 9.0], kind)
+    # Far from the others: three times their width along the slope.
+    assert len(surface.doubtful) == said
+    assert surface.sharp.any() == (not said)
+
+
+@pytest.mark.parametrize("kind", ["triangle", "quad", "quad8"])
 @pytest.mark.parametrize("facets", [2, 3, 4, 8])
 @pytest.mark.parametrize("tangent", [True, False])
 def test_fillets_are_curves(kind, facets, tangent):
@@ -172,7 +219,7 @@ def test_two_edges_with_one_facet_between_them_cannot_be_told_and_are_said(kind)
     seen = SimpleNamespace(name="c", master=surface, location=surface.locate(surface.positions))
     (said,) = edge_warnings(SimpleNamespace(surfaces=[seen]))
     assert said == (
-        "contact c: edges of the master turn by 22.5° amid what is flat, the first at (0, 1.66667, 0) m: a chamfer of one "
+        "contact c: edges of the master turn by 22.5° amid what is flat, the first at (0, 1.66667, 0) m: a chamfer or flat of one "
         "row of facets or a curve, it is taken as a curve; mesh it with two rows if it has edges there"
     )
     apart = SimpleNamespace(name="c", master=surface, location=surface.locate(surface.positions[:1] * [0.99, 0, 0]))

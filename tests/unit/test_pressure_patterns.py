@@ -12,6 +12,8 @@ import pytest
 import scipy.sparse as sp
 
 from stridor.contact.coupling import SlaveFacets
+from stridor.contact.curve import Curve
+from stridor.contact.facets import FacetSurface
 from stridor.contact.obstacles import Cylinder, Flat
 from stridor.mesh.facets import reference_nodes
 from stridor.sliding import pattern
@@ -235,6 +237,26 @@ def test_facets_of_a_shaft_are_below_it_by_its_sagitta_and_those_of_a_flat_by_no
         assert pattern.facet_height(shaft) == pytest.approx(1.5 * sagitta, rel=0.01)
     straight = two_contacts(np.zeros(40), master=bore, normal=np.tile([0.0, 1.0], (40, 1))).surfaces[1]
     assert pattern.facet_height(straight) == 0.0
+
+
+def test_flats_between_edges_leave_nothing_of_a_curve_though_nodes_off_them_look_away() -> None:
+    profile = np.array([[-4.0, -2.0], [-2.0, -1.0], [0.0, 0.0], [10.0, 0.0], [20.0, 0.0], [22.0, -1.0], [24.0, -2.0]])
+    line = np.column_stack([np.arange(6), np.arange(1, 7)])
+    plane = Curve.from_facets(profile, {"line": line[:, ::-1]}, where="w")
+    y = np.array([0.0, 5.0, 10.0])
+    points = np.array([[x, v, z] for v in y for x, z in profile])
+    quads = np.array([[7 * j + i, 7 * j + i + 1, 7 * j + i + 8, 7 * j + i + 7] for j in range(2) for i in range(6)])
+    space = FacetSurface.from_facets(points, {"quad": quads}, where="w")
+    x = np.linspace(-3.0, 23.0, 27)
+    flat = np.column_stack([x, np.full(27, 4.0)])
+    over = np.array([[u, v, w] for v in np.linspace(1, 9, 9) for u, w in flat])
+    for master, slaves in ((plane, flat), (space, over)):
+        found = master.locate(slaves)
+        # Off the edges nodes do look away from them, between the sides that turn by 27°.
+        tilt = np.degrees(np.arccos(np.clip(found.normal[:, -1], -1, 1)))
+        assert np.any((tilt > 1.0) & (tilt < 26.0))
+        surface = SimpleNamespace(slave_position=slaves, location=found, master=master)
+        assert pattern.facet_height(surface) == 0.0
 
 
 def test_what_facets_leave_open_all_over_is_told_with_its_remedy(monkeypatch) -> None:

@@ -21,6 +21,8 @@ from .kinks import EVEN, LIKE, RATIO, SLIGHT
 
 # cos of the angle between edges that continue each other, or lie side by side.
 ALONG = np.cos(np.radians(30.0))
+# cos of the angle between what is across an edge and where one is that follows it.
+ACROSS = 0.5
 # Where an arc begins beside a flat, its first edge turns by half of what the next do.
 BEGINS = 2.0 / 3.0
 # Edges sharper than the corner angle and no sharper than this that follow each other alike may be a coarse curve.
@@ -113,12 +115,16 @@ def _normals(kind: str, facets: Array, local: Array) -> Array:
     return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
 
 
-def creases(edges: Edges, corners: IntArray, corner_angle: float) -> Creases:
+def creases(edges: Edges, corners: IntArray, positions: Array, corner_angle: float) -> Creases:
     """Which edges between facets with corners (f, 4), −1 in the last place of a triangle, are edges of the body.
+
+    positions (k, 3) [m] are those of the nodes.
 
     corner_angle [rad]: beyond it all are. Others are where they stand alone: on both sides facets are flat, or turn by
     a tenth. A side that ends with the facet at an edge of the surface, or at a sharp one, says nothing: then the other
     side has to be flat. Three and more at even distances, that turn alike, are a curve whose facets were divided.
+    Of few flats, of which no three edges follow each other, those round one that is far wider than the others are
+    edges, as an arc has no such facet; of others it cannot be told.
     """
     size = np.abs(edges.turn)
     sharp = size > corner_angle
@@ -140,9 +146,13 @@ def creases(edges: Edges, corners: IntArray, corner_angle: float) -> Creases:
     lone &= ~curve
     whole, part = _reaching(edges, lone, corners, sharp)
     lone = whole | part
+    wide, few = _of_few_flats(edges, corners, positions, sharp | lone)
+    held = _reaching(edges, (wide | few) & ~curve, corners, sharp | lone)[0]
+    wide, few = wide & held, few & held
+    lone |= wide
     doubtful = _doubtful(edges, around, size, sharp, lone | curve, alike, told)
     doubtful &= sharp | _reaching(edges, doubtful, corners, sharp | lone)[0]
-    return Creases(sharp | lone, doubtful & (sharp | _straight_on(edges, doubtful)))
+    return Creases(sharp | lone, few | (doubtful & (sharp | _straight_on(edges, doubtful))))
 
 
 def _doubtful(
@@ -319,10 +329,7 @@ def _even(edges: Edges, lone: BoolArray, sharp: BoolArray, facets: int) -> BoolA
     neighbour."""
     if not lone.any():
         return lone
-    joined = ~lone & ~sharp & (np.abs(edges.turn) <= SLIGHT)
-    a, b = edges.facets[joined].T
-    graph = sp.coo_array((np.ones(len(a)), (a, b)), shape=(facets, facets))
-    flat = np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+    flat = _joined(edges.facets[~lone & ~sharp & (np.abs(edges.turn) <= SLIGHT)], facets)
     which = np.flatnonzero(lone)
     found = np.zeros(len(lone), dtype=bool)
     distance = np.full((len(which), 2), np.inf)
@@ -352,3 +359,103 @@ def _even(edges: Edges, lone: BoolArray, sharp: BoolArray, facets: int) -> BoolA
     found[which[amid]] = True
     found[partner[amid].ravel()] = True
     return found
+
+
+def _joined(pairs: IntArray, count: int) -> IntArray:
+    """The number (count,) of the lot that each of so many belongs to, where pairs (p, 2) belong together."""
+    graph = sp.coo_array((np.ones(len(pairs)), tuple(pairs.T)), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def _of_few_flats(
+    edges: Edges, corners: IntArray, positions: Array, settled: BoolArray
+) -> tuple[BoolArray, BoolArray]:
+    """Which edges (e,) other than settled ones (e,) are between so few flats that these are as much those of a body as
+    facets of a curve: first those of a body by the widths of the flats, then those of which that cannot be told.
+
+    Of a curve three edges follow each other over two flats, or two flats beside each other have curved ones all round.
+    """
+    size, none = np.abs(edges.turn), np.zeros(len(edges.turn), dtype=bool)
+    bent = ~settled & (size > SLIGHT) & (edges.own.max(axis=1) <= SLIGHT)
+    if not bent.any():
+        return none, none
+    flat = _joined(edges.facets[~settled & (size <= SLIGHT)], len(corners))
+    flats = int(flat.max()) + 1
+    sides = flat[edges.facets]
+    bent &= sides[:, 0] != sides[:, 1]
+    piece = _joined(sides[bent], flats)
+    # Flats with bent edges all round: of the sides of their facets all are within, or bent.
+    within = ~settled & (sides[:, 0] == sides[:, 1])
+    number = np.bincount(flat, weights=(corners >= 0).sum(axis=1), minlength=flats)
+    number -= np.bincount(sides[bent | within].ravel(), minlength=flats)
+    amid = (number == 0)[sides].all(axis=1) & bent
+    curved = np.zeros(flats, dtype=bool)
+    curved[piece[sides[amid, 0]]] = True
+    which = np.flatnonzero(bent & ~curved[piece[sides[:, 0]]])
+    if not len(which):
+        return none, none
+    follows, partner = _following(edges, sides, which)
+    amid = none.copy()
+    amid[which] = follows.all(axis=1)
+    told = amid.copy()
+    told[partner[amid[which]]] = True
+    told[which] |= (follows & amid[np.where(partner < 0, 0, partner)]).any(axis=1)
+    few = none.copy()
+    few[which] = ~told[which]
+    return _round_a_wide_one(edges, corners, positions, flat, piece, few)
+
+
+def _following(edges: Edges, sides: IntArray, which: IntArray) -> tuple[BoolArray, IntArray]:
+    """Whether on the other side of the flats on both sides of edges (q,) is one along them that turns alike (q, 2),
+    and the nearest such (q, 2), −1 where none is."""
+    partner = np.full((len(which), 2), -1, dtype=np.int64)
+    owner, side = np.repeat(np.arange(len(which)), 2), np.tile([0, 1], len(which))
+    patch = sides[which].ravel()
+    order = np.argsort(patch, kind="stable")
+    for lot in np.split(order, np.flatnonzero(np.diff(patch[order])) + 1):
+        e = which[owner[lot]]
+        step = max(1, 1_000_000 // len(lot))
+        for some in (lot[k : k + step] for k in range(0, len(lot), step)):
+            mine = which[owner[some]]
+            away = edges.middle[e][None] - edges.middle[mine][:, None]
+            off = np.linalg.norm(away, axis=2)
+            ahead = np.einsum("ijd,id->ij", away, edges.inward[mine, side[some]])
+            ratio = edges.turn[e][None] / edges.turn[mine][:, None]
+            like = (ratio <= LIKE) & (ratio >= 1.0 / LIKE) & (mine[:, None] != e[None])
+            like &= (np.abs(edges.along[mine] @ edges.along[e].T) >= ALONG) & (ahead > ACROSS * off)
+            off = np.where(like, off, np.inf)
+            best = np.argmin(off, axis=1)
+            found = np.isfinite(off[np.arange(len(some)), best])
+            partner[owner[some][found], side[some][found]] = e[best[found]]
+    return partner >= 0, partner
+
+
+def _round_a_wide_one(
+    edges: Edges, corners: IntArray, positions: Array, flat: IntArray, piece: IntArray, few: BoolArray
+) -> tuple[BoolArray, BoolArray]:
+    """Of few edges (e,) between flats, of which facets (f,) and pieces of the surface (flats,) are part, those of
+    pieces with one flat that all others lie at and are far narrower than, and the rest."""
+    wide = np.zeros(len(few), dtype=bool)
+    sides = flat[edges.facets]
+    which = np.flatnonzero(few)
+    of = piece[sides[which, 0]]
+    for lot in (which[of == k] for k in np.unique(of)):
+        members = np.unique(sides[lot])
+        reach = {}
+        for one in members.tolist():
+            nodes = np.unique(corners[flat == one])
+            place = positions[nodes[nodes >= 0]]
+            for e, s in zip(*np.nonzero(sides[lot] == one), strict=True):
+                edge = int(lot[e])
+                across = (place - edges.middle[edge]) @ edges.inward[edge, s]
+                reach[edge, one] = float(across.max())
+        for one in members.tolist():
+            mine = lot[(sides[lot] == one).any(axis=1)]
+            others = np.setdiff1d(np.unique(sides[mine]), [one])
+            if len(others) + 1 < len(members):
+                continue
+            least = min(reach[int(e), one] for e in mine)
+            most = max(reach[int(e), int(sides[e][sides[e] != one][0])] for e in mine)
+            if least > LIKE * most:
+                wide[lot] = True
+    return wide, few & ~wide

@@ -15,6 +15,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..kernels import njit
@@ -217,6 +219,19 @@ class Curve:
             inside[cornered] = True
         gap = np.sum(normal * (slaves - point), axis=1)
         return Location(nodes, weights, point, normal, gap, segment, inside, xi[:, None])
+
+    def smooth_at(self, location: Location) -> tuple[Array, IntArray]:
+        """The undisplaced curve's own normals (m, 2) at places on it, off corners those of one of the sides, and the
+        number (m,) of the part between corners that each is on."""
+        xi = np.zeros(len(location.facet)) if location.local is None else location.local[:, 0]
+        segment = location.facet
+        slopes = weights_at(segment, xi, self.stencils, self.chords)[1]
+        along = np.einsum("mr,mrd->md", slopes, self.positions[np.maximum(self.stencils[segment], 0)])
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        count, before = len(self.chords), np.flatnonzero(self.after >= 0)
+        graph = sp.coo_array((np.ones(len(before)), (before, self.after[before])), shape=(count, count))
+        parts = np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+        return np.stack([along[:, 1], -along[:, 0]], axis=1), parts[segment]
 
     def _corner_normals(self, corner: IntArray, offset: Array, current: Array) -> Array:
         """Out of a corner towards (from, inside the body) slaves at an offset (q, 2) from it."""

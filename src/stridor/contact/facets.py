@@ -106,7 +106,7 @@ class FacetSurface:
         kinds, parts = tuple(kind for kind, _, _ in splits), tuple(tuple(split) for _, _, split in splits)
         own = {kind: np.searchsorted(nodes, block).astype(np.int64) for kind, block in blocks}
         edges = edges_of(positions, own)
-        found = creases(edges, corners_of(own), np.radians(corner_deg))
+        found = creases(edges, corners_of(own), positions, np.radians(corner_deg))
         sharp = (neighbours >= 0) & _edges_of_parts(edges, found.edge, own, kinds, parts)
         groups = _groups(local, neighbours, over_edge, sharp)
         curved = np.array([len(_splits(kind)) > 1 for kind in kinds])
@@ -255,6 +255,16 @@ class FacetSurface:
             normal[corner] = self._edge_normals(facet[corner], across, slaves[corner] - point[corner], current)
         gap = np.sum(normal * (slaves - point), axis=1)
         return Location(nodes, weights, point, normal, gap, facet, inside, local)
+
+    def smooth_at(self, location: Location) -> tuple[Array, IntArray]:
+        """The undisplaced surface's own normals (m, 3) at places on it, off edges those of one of the sides, and the
+        number (m,) of the part between edges that each is on."""
+        local = np.zeros((len(location.facet), 2)) if location.local is None else location.local
+        normal = self._at(self.positions, self._normals(self.positions), location.facet, local)[1]
+        facet, edge = np.nonzero((self.neighbours >= 0) & ~self.sharp)
+        pairs, count = (facet, self.neighbours[facet, edge]), len(self.facets)
+        parts = connected_components(sp.coo_array((np.ones(len(facet)), pairs), shape=(count, count)), directed=False)
+        return normal, np.asarray(parts[1], dtype=np.int64)[location.facet]
 
     def _at(
         self, current: Array, normals: Array, facet: IntArray, local: Array

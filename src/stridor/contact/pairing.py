@@ -253,10 +253,13 @@ def repair(
     return replace(contact, location=location, nodes=nodes), np.flatnonzero(left)
 
 
-def overlap_tolerance(position: Array, normals: Array, master: MasterSurface) -> float:
+def overlap_tolerance(
+    position: Array, normals: Array, master: MasterSurface, parts: IntArray | None = None
+) -> float:
     """How far [m] curved surfaces that fit may seem to overlap: 1.5 times the chord heights h²/8R of both.
 
-    position (m, d), normals (m, d): the slave nodes, whose chords are taken between nearest neighbours.
+    position (m, d), normals (m, d): the slave nodes, whose chords are taken between nearest neighbours; of the same of
+    parts (m,) only, where these are known.
     """
     rounding = 1e-9 * float(np.linalg.norm(np.ptp(position, axis=0)))
     rounding = max(rounding + rounding_of(position), rounding_of(*_placing(master)))
@@ -267,6 +270,8 @@ def overlap_tolerance(position: Array, normals: Array, master: MasterSurface) ->
         change = normals[near] - normals[:, None]
         # Across a corner of the slave there is no chord of a curve.
         smooth = np.sum(normals[near] * normals[:, None], axis=2) > np.cos(np.radians(40.0))
+        if parts is not None:
+            smooth &= parts[near] == parts[:, None]
         heights = np.abs(np.sum(change * (position[near] - position[:, None]), axis=2)) / 8.0
         height += float(np.where(smooth, heights, 0.0).max())
     return 1.5 * height + rounding

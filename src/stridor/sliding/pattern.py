@@ -13,6 +13,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..contact.coupling import SlaveFacets
+from ..contact.curve import Curve
+from ..contact.facets import FacetSurface
 from ..contact.pairing import overlap_tolerance
 from ..contact.surfaces import SurfaceContact
 from ..system import System
@@ -83,7 +85,11 @@ def left_by_facets(system: System) -> Iterator[str]:
 
 def facet_height(surface: SurfaceContact) -> float:
     """How far [m] facets may be off the curved surfaces of a contact, 0 for flat ones."""
-    height = overlap_tolerance(surface.slave_position, -surface.location.normal, surface.master)
+    normal, parts, master = surface.location.normal, None, surface.master
+    if isinstance(master, Curve | FacetSurface):
+        # Off an edge of the body nodes look away from it, which is no curve.
+        normal, parts = master.smooth_at(surface.location)
+    height = overlap_tolerance(surface.slave_position, -normal, master, parts)
     return height if height > 1e-8 * float(np.linalg.norm(np.ptp(surface.slave_position, axis=0))) else 0.0
 
 

@@ -457,7 +457,7 @@ def edge_warnings(system: System) -> list[str]:
                 if sharp
                 else (
                     "amid what is flat",
-                    "a chamfer of one row of facets or a curve, it is taken as a curve; mesh it with two rows if it "
+                    "a chamfer or flat of one row of facets or a curve, it is taken as a curve; mesh it with two rows if it "
                     "has edges there",
                 )
             )
