@@ -146,7 +146,7 @@ def creases(edges: Edges, corners: IntArray, positions: Array, corner_angle: flo
     lone &= ~curve
     whole, part = _reaching(edges, lone, corners, sharp)
     lone = whole | part
-    wide, few = _of_few_flats(edges, corners, positions, sharp | lone)
+    wide, few = _of_few_flats(edges, around, positions, sharp | lone)
     held = _reaching(edges, (wide | few) & ~curve, corners, sharp | lone)[0]
     wide, few = wide & held, few & held
     lone |= wide
@@ -217,6 +217,25 @@ class _Around:
                 other[there, 0] = np.maximum(other[there, 0], -part)
                 told[there] = True
         return same.reshape(count, 2), other.reshape(count, 2), told.reshape(count, 2)
+
+    def followed_by(self, bent: BoolArray, sides: IntArray) -> IntArray:
+        """Of bent edges (e,) between flats (e, 2): one at the far corners of both facets (e, 2) that follows over the
+        same flat, along them and turning alike, −1 where none is."""
+        edges, count = self.edges, len(self.edges.turn)
+        partner = np.full(2 * count, -1, dtype=np.int64)
+        flat, patch, inward = self.far.reshape(2 * count, 4), sides.ravel(), edges.inward.reshape(2 * count, 3)
+        for corner in range(4):
+            for there, found in self.each(flat[:, corner]):
+                mine = there // 2
+                near = bent[mine] & bent[found] & (mine != found) & (sides[found] == patch[there, None]).any(axis=1)
+                there, found, mine = there[near], found[near], mine[near]
+                away = edges.middle[found] - edges.middle[mine]
+                ratio = edges.turn[found] / edges.turn[mine]
+                like = (ratio <= LIKE) & (ratio >= 1.0 / LIKE)
+                like &= np.abs(np.sum(edges.along[found] * edges.along[mine], axis=1)) >= ALONG
+                like &= np.sum(away * inward[there], axis=1) > ACROSS * np.linalg.norm(away, axis=1)
+                partner[there[like]] = found[like]
+        return partner.reshape(count, 2)
 
     def turns_back(self, edge: int, side: int) -> bool:
         """Whether two facets away on a side edges turn the other way."""
@@ -368,14 +387,14 @@ def _joined(pairs: IntArray, count: int) -> IntArray:
 
 
 def _of_few_flats(
-    edges: Edges, corners: IntArray, positions: Array, settled: BoolArray
+    edges: Edges, around: _Around, positions: Array, settled: BoolArray
 ) -> tuple[BoolArray, BoolArray]:
     """Which edges (e,) other than settled ones (e,) are between so few flats that these are as much those of a body as
     facets of a curve: first those of a body by the widths of the flats, then those of which that cannot be told.
 
     Of a curve three edges follow each other over two flats, or two flats beside each other have curved ones all round.
     """
-    size, none = np.abs(edges.turn), np.zeros(len(edges.turn), dtype=bool)
+    corners, size, none = around.corners, np.abs(edges.turn), np.zeros(len(edges.turn), dtype=bool)
     bent = ~settled & (size > SLIGHT) & (edges.own.max(axis=1) <= SLIGHT)
     if not bent.any():
         return none, none
@@ -394,28 +413,30 @@ def _of_few_flats(
     which = np.flatnonzero(bent & ~curved[piece[sides[:, 0]]])
     if not len(which):
         return none, none
-    follows, partner = _following(edges, sides, which)
-    amid = none.copy()
-    amid[which] = follows.all(axis=1)
-    told = amid.copy()
-    told[partner[amid[which]]] = True
-    told[which] |= (follows & amid[np.where(partner < 0, 0, partner)]).any(axis=1)
+    # Most follow each other over one facet; only for the others all edges of a flat are looked through.
+    partner = around.followed_by(bent, sides)
+    told: BoolArray = np.asarray((partner >= 0).all(axis=1))
+    rest = which[~told[which]]
+    partner[rest] = _following(edges, sides, which, ~told)[~told[which]]
+    amid = bent & (partner >= 0).all(axis=1)
+    told = np.asarray(amid | ((partner >= 0) & amid[partner]).any(axis=1))
+    told[partner[amid]] = True
     few = none.copy()
     few[which] = ~told[which]
     return _round_a_wide_one(edges, corners, positions, flat, piece, few)
 
 
-def _following(edges: Edges, sides: IntArray, which: IntArray) -> tuple[BoolArray, IntArray]:
-    """Whether on the other side of the flats on both sides of edges (q,) is one along them that turns alike (q, 2),
-    and the nearest such (q, 2), −1 where none is."""
+def _following(edges: Edges, sides: IntArray, which: IntArray, asked: BoolArray) -> IntArray:
+    """The nearest of edges (q,) along each of them that are asked for (e,) that turns alike on the other side of the
+    flats on both sides (q, 2), −1 where none is."""
     partner = np.full((len(which), 2), -1, dtype=np.int64)
     owner, side = np.repeat(np.arange(len(which)), 2), np.tile([0, 1], len(which))
     patch = sides[which].ravel()
     order = np.argsort(patch, kind="stable")
     for lot in np.split(order, np.flatnonzero(np.diff(patch[order])) + 1):
         e = which[owner[lot]]
-        step = max(1, 1_000_000 // len(lot))
-        for some in (lot[k : k + step] for k in range(0, len(lot), step)):
+        rows, step = lot[asked[e]], max(1, 1_000_000 // len(lot))
+        for some in (rows[k : k + step] for k in range(0, len(rows), step)):
             mine = which[owner[some]]
             away = edges.middle[e][None] - edges.middle[mine][:, None]
             off = np.linalg.norm(away, axis=2)
@@ -427,7 +448,7 @@ def _following(edges: Edges, sides: IntArray, which: IntArray) -> tuple[BoolArra
             best = np.argmin(off, axis=1)
             found = np.isfinite(off[np.arange(len(some)), best])
             partner[owner[some][found], side[some][found]] = e[best[found]]
-    return partner >= 0, partner
+    return partner
 
 
 def _round_a_wide_one(

@@ -457,8 +457,8 @@ def edge_warnings(system: System) -> list[str]:
                 if sharp
                 else (
                     "amid what is flat",
-                    "a chamfer or flat of one row of facets or a curve, it is taken as a curve; mesh it with two rows if it "
-                    "has edges there",
+                    "a chamfer or flat of one row of facets or a curve, it is taken as a curve; mesh it with two rows "
+                    "if it has edges there",
                 )
             )
             lead = f"contact {surface.name}: edges of the master turn by {angle:.3g}° {how}"
