@@ -104,7 +104,7 @@ def _searched_for(
         asked = ("stands", rate, touching_at, options)
         return system.once(asked, lambda: is_stiff(problem.pencil(0.0).condensed(), rate, options.solver))
 
-    found = band_modes(whole, top / (2 * np.pi), above=-BESIDE * top, stands=stands, solver=options.solver)
+    found = band_modes(whole, top / (2 * np.pi), above=-BESIDE * top, stands=stands, solver=options.solver, others=True)
     size = np.abs(found.values)
     rounding = UNSTABLE_RELATIVE if problem.damped else SPLIT_RELATIVE
     limit = rest_limit([whole], top, options.solver) if np.any(size <= SLOW * top) else 0.0

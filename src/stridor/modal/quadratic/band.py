@@ -31,16 +31,18 @@ def band_modes(
     left: bool = False,
     solver: str | None = None,
     still: float = 0.0,
+    others: bool = False,
 ) -> RegionModes:
     """All eigenvalues with frequencies up to ``max_hz`` [Hz] and growth rates over ``above`` [1/s].
 
     `find_modes` cuts an endless region off at the size of its frequencies, which holds all where stiffness is positive.
     A negative one lets motions diverge at any rate, at frequency zero and so in every band. stands: whether the problem
     at the least friction diverges at no more than a rate [1/s] (`is_stiff`); where it may, or where a negative damping,
-    XX for each factor of eight. Small problems are solved whole. still: as in `find_modes`.
+    XX for each factor of eight. Small problems are solved whole. still, others: as in `find_modes`.
     What was not searched the completeness says.
     """
-    found = find_modes(problem, Region.band(0.0, max_hz, above=above), left=left, solver=solver, still=still)
+    band = Region.band(0.0, max_hz, above=above)
+    found = find_modes(problem, band, left=left, solver=solver, still=still, others=others)
     top = 2 * np.pi * max_hz
     if problem.size <= DENSE or (stands(QUIET * top) and not driven(problem, QUIET * top, solver)):
         return found
@@ -100,5 +102,5 @@ def _joined(slow: RegionModes, fast: RegionModes, near: float) -> RegionModes:
     return RegionModes(
         values[order], np.concatenate([slow.right, fast.right[:, fresh]], axis=1)[:, order], left,
         rates(slow.residual, fast.residual), left_residual, told, slow.factorisations + fast.factorisations,
-        slow.solves + fast.solves, slow.seconds + fast.seconds, max(slow.memory_bytes, fast.memory_bytes),
+        slow.solves + fast.solves, slow.seconds + fast.seconds, max(slow.memory_bytes, fast.memory_bytes), slow.beside,
     )  # fmt: skip

@@ -65,8 +65,8 @@ class RegionModes:
 
     right (n, k): P(λ)x = 0; left (n, k): yᵀP(λ) = 0, transposed and not conjugated; both of unit norm. residual and
     left_residual (k,): componentwise backward errors. beside (n, l): shapes found on the way of eigenvalues outside the
-    region, of which nothing is claimed. factorisations, solves (single right sides), seconds and memory_bytes (of the
-    factors held at one time) tell what it cost.
+    region, of which nothing is claimed, where they were asked for. factorisations, solves (single right sides), seconds
+    and memory_bytes (of the factors held at one time) tell what it cost.
     """
 
     values: ComplexArray
@@ -85,18 +85,19 @@ class RegionModes:
 @one_thread
 def find_modes(
     problem: Quadratic, region: Region, *, left: bool = False, tolerance: float = 1e-10, solver: str | None = None,
-    guess: Any = None, count: bool | None = None, hint: bool = False, still: float = 0.0,
+    guess: Any = None, count: bool | None = None, hint: bool = False, still: float = 0.0, others: bool = False,
 ) -> RegionModes:  # fmt: skip
     """All eigenvalues of λ²M + λD + K in ``region``, with right and, if asked for, left vectors.
 
     tolerance: backward error of every pair. guess (n, k): shapes of a neighbouring problem to start from; they decide
     nothing, and save little. count: whether the argument principle is to count; by default up to 1500 freedoms.
     hint: count undamped modes too, at two more factorisations. still [1/s]: eigenvalues no larger are motions as a
-    whole, of which the matrices may hold nothing but rounding, and need not reach the tolerance. Raises AnalysisError
-    where P(λ) is singular for every λ, the region holds too many eigenvalues, or others do not reach the tolerance.
+    whole, of which the matrices may hold nothing but rounding, and need not reach the tolerance. others: whether shapes
+    met on the way are wanted (`RegionModes.beside`). Raises AnalysisError where P(λ) is singular for every λ, the
+    region holds too many eigenvalues, or some do not reach the tolerance.
     """
     started = time.perf_counter()
-    run = _RegionSearch(problem, region.bounded(), left, tolerance, solver, guess, still)
+    run = _RegionSearch(problem, region.bounded(), left, tolerance, solver, guess, still, others)
     run.counting = problem.size <= COUNTED if count is None else count
     if problem.size <= DENSE:
         sides, evidence = run.dense(endless=not math.isfinite(region.re_max))
@@ -154,6 +155,7 @@ class _RegionSearch:
     solver: str | None
     guess: Any
     still: float = 0.0
+    others: bool = False
     counting: bool = False
     factorisations: int = 0
     solves: int = 0
@@ -224,7 +226,8 @@ class _RegionSearch:
 
         for site in self.sites:
             site.factor.free()
-        self.beside = np.hstack([site.searches[0].beside for site in self.sites])
+        beside = [s.beside for site in self.sites for s in site.searches if s.beside is not None]
+        self.beside = np.hstack(beside) if beside else None
         return sides, evidence
 
     def chosen(self, sides: list[DiscModes]) -> tuple[ComplexArray, ComplexArray, ComplexArray | None]:
@@ -325,6 +328,7 @@ class _RegionSearch:
         for problem, solve in sides:
             search = Search(problem, Krylov(problem, solve, shift, radius), self.keep, most, self.tolerance)
             search.seed += 100 * len(searches)
+            search.others = self.others and not searches
             search.run(None if self.guess is None or searches else np.asarray(self.guess))
             searches.append(search)
         if not self.left:

@@ -43,7 +43,8 @@ class DiscModes:
 class Search:
     """One shift's Krylov space, kept so that it can grow where something turns out to be missing.
 
-    keep tells the eigenvalues whose shapes are wanted; most: vectors at most; tolerance: of the backward error.
+    keep tells the eigenvalues whose shapes are wanted; most: vectors at most; tolerance: of the backward error. others:
+    whether shapes of other eigenvalues are wanted as well, as they are.
     """
 
     problem: Quadratic
@@ -54,8 +55,9 @@ class Search:
     looks: int = 0
     later: int = 0  # eigenvalues that only a second look brought
     seed: int = SEED
+    others: bool = False
     found: DiscModes = field(init=False)
-    beside: ComplexArray = field(init=False)  # (n, l), see `RegionModes`
+    beside: ComplexArray | None = None  # (n, l), see `RegionModes`
     disc: Disc = field(init=False)
     guards: ComplexArray = field(init=False)  # Ritz values outside the disc that have nearly converged
     _values: ComplexArray = field(init=False)
@@ -158,8 +160,9 @@ class Search:
         self._values = values[inside]
         self.found = DiscModes(values[kept], shapes, error)
         self.guards = values[nearly & ~kept]
-        others = np.flatnonzero(nearly & ~kept & (values.imag >= 0))
-        self.beside = krylov.shapes(theta[others], vectors[:, others])
+        if self.others:
+            beside = np.flatnonzero(nearly & ~kept & (values.imag >= 0))
+            self.beside = krylov.shapes(theta[beside], vectors[:, beside])
         return True, 0
 
     def _patience(self) -> float:
