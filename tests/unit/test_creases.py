@@ -8,7 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from stridor.contact.creases import corners_of, creases, edges_of
+from stridor.contact.creases import creases
+from stridor.contact.facet_edges import corners_of, edges_of
 from stridor.contact.facets import CORNER_DEG, FacetSurface
 from stridor.mesh.facets import reference_nodes, shape_functions
 from stridor.study.description import edge_warnings

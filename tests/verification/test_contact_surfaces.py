@@ -411,14 +411,20 @@ def test_nodes_edges_and_vertices_of_the_surface_are_inside(kind):
     assert surface.locate(edge).inside.tolist() == [True, False]
 
 
-@pytest.mark.parametrize("kind", QUADRATIC)
-def test_gap_of_a_cylinder_of_quadratic_faces_is_wrong_to_fourth_order_and_its_normal_exact(kind):
-    """As the faces interpolate the circle: R(1 − |Σ φ n|), of the order of the fourth power of their angle."""
-    errors = []
+def around_a_cylinder() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Radii (300,), directions and places (300, 3) of points around a cylinder of radius one."""
     rng = np.random.default_rng(5)
     angle, radius, z = rng.uniform(0, 7, 300), rng.uniform(0.9, 1.5, 300), rng.uniform(0, 1, 300)
     radial = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     slaves = radius[:, None] * radial + z[:, None] * [0, 0, 1]
+    return radius, radial, slaves
+
+
+@pytest.mark.parametrize("kind", QUADRATIC)
+def test_gap_of_a_cylinder_of_quadratic_faces_is_wrong_to_fourth_order_and_its_normal_exact(kind):
+    """As the faces interpolate the circle: R(1 − |Σ φ n|), of the order of the fourth power of their angle."""
+    errors = []
+    radius, radial, slaves = around_a_cylinder()
     for around in (8, 16):
         surface = FacetSurface.from_facets(*cylinder(kind, around, around // 4), where="w")
         found = surface.locate(slaves)
@@ -435,10 +441,7 @@ def test_gap_of_a_cylinder_of_quadratic_faces_is_wrong_to_fourth_order_and_its_n
 @pytest.mark.parametrize("kind", LINEAR)
 def test_gap_of_a_cylinder_is_wrong_by_the_chord_height_and_its_normal_exact(kind):
     errors = []
-    rng = np.random.default_rng(5)
-    angle, radius, z = rng.uniform(0, 7, 300), rng.uniform(0.9, 1.5, 300), rng.uniform(0, 1, 300)
-    radial = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
-    slaves = radius[:, None] * radial + z[:, None] * [0, 0, 1]
+    radius, radial, slaves = around_a_cylinder()
     for around in (16, 32):
         surface = FacetSurface.from_facets(*cylinder(kind, around, around // 4), where="w")
         found = surface.locate(slaves)

@@ -25,7 +25,8 @@ from ..errors import CaseError
 from ..mesh.facets import reference_nodes, shape_functions
 from ..mesh.model import Blocks
 from ..typing import Array, BoolArray, IntArray
-from .creases import Edges, corners_of, creases, edges_of
+from .creases import creases
+from .facet_edges import Edges, corners_of, edges_of
 from .facet_search import EDGE_TOLERANCE, MONOMIALS, edge_coordinates, locate_all, nearest_edges, shape_of
 from .master import Location
 

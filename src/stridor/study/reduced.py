@@ -131,7 +131,7 @@ def parametric_problem(
                 raise CaseError(f"box.{name}", None, f"{why}; take another number")
     settings = case.modal
     family = _family(case, numbers, parameters, numbers.own if held_at is None else numbers.pressed(held_at))
-    solver = None if settings.solver == "auto" else settings.solver
+    solver = _solver(case)
     friction = next((p for p in parameters if p.name == FRICTION), None)
     if held_at is not None:
         instead = held_at.get(FRICTION)
