@@ -205,7 +205,7 @@ def test_dense_modes_that_are_about_to_meet_do_not_take_the_companion_matrix(mon
     # What others' answers leave unsettled takes the inverse itself; where that is too much, the companion matrix.
     unsettled, top = close_pairs(5)
     assert not dense_modes(*unsettled, top, 1.0).whole
-    monkeypatch.setattr("stridor.modal.parametric.dense.FEW", 0)
+    monkeypatch.setattr("stridor.modal.parametric.from_undamped.FEW", 0)
     assert dense_modes(*unsettled, top, 1.0).whole
 
 

@@ -196,6 +196,11 @@ def combined(basis: Array, weights: Any) -> Any:
     return result
 
 
+def images(stacked: Array, z: ComplexArray) -> ComplexArray:
+    """Mz, Dz and Kz (3, s, k) of matrices (3, s, r) that lie one after the other, in one product."""
+    return np.asarray(combined(stacked.reshape(-1, stacked.shape[2]), z)).reshape(*stacked.shape[:2], -1)
+
+
 def upper_root(squares: ComplexArray) -> ComplexArray:
     """λ (k,) of λ² with Im λ ≥ 0, and Re λ ≥ 0 where it is real."""
     root: ComplexArray = np.sqrt(squares + 0j)

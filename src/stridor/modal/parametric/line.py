@@ -11,9 +11,9 @@ import numpy as np
 
 from ...errors import AnalysisError
 from ...typing import Array, ComplexArray, IntArray
-from ..dense_problem import Eigenpairs, OverNumber, combined
+from ..dense_problem import Eigenpairs, OverNumber, combined, images
 from ..krylov.follow import BranchState, Follower
-from .dense import assembled_each, images
+from .dense import assembled_each
 from .model import ReducedModel, ReducedModes
 
 TRIES = 16  # points of a line at most; what needs more is not told

@@ -25,11 +25,11 @@ from ...tabular import MODE, Rows, Tabular, mode_cells
 from ...threads import one_thread
 from ...typing import Array, BoolArray, ComplexArray
 from ..at_rest import more_slow, moving, rest_limit, slow_words, told_growth
-from ..dense_problem import combined
+from ..dense_problem import combined, images
 from ..quadratic.problem import Quadratic
 from ..quadratic.reach import searched_in
 from ..tolerances import UNSTABLE_RELATIVE
-from .dense import DenseModes, assembled, assembled_each, dense_modes, images
+from .dense import DenseModes, assembled, assembled_each, dense_modes
 from .problem import ParametricProblem
 from .states import States
 
