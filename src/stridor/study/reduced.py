@@ -26,6 +26,7 @@ from ..sliding.stretches import (
     stretches_along,
 )
 from ..system import System, build_system
+from ..system.bodies import KnownBodies
 from ..system.imported import ImportedTerm
 from ..system.shares import system_shares
 from ..typing import IntArray
@@ -321,8 +322,8 @@ class Numbers:
     """The systems of a case with other numbers: own is that of the case as it is."""
 
     def __init__(self, case: Case, box: Mapping[str, tuple[float, float]]) -> None:
-        self._case, self._box = case, box
-        self.own = build_system(case).in_place()
+        self._case, self._box, self._bodies = case, box, KnownBodies()
+        self.own = build_system(case, known=self._bodies).in_place()
         # In factors of imported matrices, unless that is a parameter of its own.
         self.named_in_factors = MU in case.factor_names and MU not in case.parameters
         self._built: dict[tuple[tuple[str, float], ...], System] = {}
@@ -337,7 +338,7 @@ class Numbers:
         if key not in self._built:
             while len(self._built) >= REMEMBERED:
                 del self._built[next(iter(self._built))]
-            self._built[key] = self._checked(build_system(self._varied(changes), mu).in_place())
+            self._built[key] = self._checked(build_system(self._varied(changes), mu, known=self._bodies).in_place())
         return self._built[key]
 
     def _varied(self, changes: dict[str, float]) -> Case:
@@ -364,7 +365,8 @@ class Numbers:
         soft = {f"contacts.{name}.stiffness": c.stiffness for name, c in self._case.contacts.items()}
         changes = {path: factor * own for path, own in soft.items() if not isinstance(own, str)}
         mu = values.get(MU) if self.named_in_factors else None
-        return self._checked(build_system(self._case.with_({**self._changes(values), **changes}), mu).in_place())
+        varied = self._case.with_({**self._changes(values), **changes})
+        return self._checked(build_system(varied, mu, known=self._bodies).in_place())
 
     def structure(self, values: Mapping[str, float]) -> Mapping[str, FactoredPart]:
         """The pieces of mass, damping and stiffness where others than [parameters] and friction have these values."""

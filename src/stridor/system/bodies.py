@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,7 +20,7 @@ from ..laws import Material
 from ..mesh.model import Mesh
 from ..typing import Array, IntArray, Sparse
 from .imported import load_matrices
-from .meshes import LoadedMesh, load_mesh
+from .meshes import LoadedMesh, load_mesh, mesh_follows_from
 from .size import refuse_too_many, refuse_too_many_read
 
 AXES = ("x", "y", "z")
@@ -86,35 +88,42 @@ class _Known:
     """A solid as it was built, and from what."""
 
     table: SolidBody
+    meshed: tuple[object, ...]
     material: Material
     mesh: LoadedMesh
     built: BuiltBody
 
 
 class KnownBodies:
-    """Solids of cases that differ in a few numbers, by name: what is the same in the next case is not built again."""
+    """Solids of cases that differ in a few numbers, by name, and what ties them: what is the same in the next case is
+    not built again."""
 
     def __init__(self) -> None:
         self._last: dict[str, _Known] = {}
+        self._tied: tuple[Any, Any] | None = None
+
+    def tied(self, of: Any, make: Callable[[], Any]) -> Any:
+        """What ties follow from: the first made, where this case's are ``of`` the same."""
+        if self._tied is None:
+            self._tied = (of, make())
+            return self._tied[1]
+        return self._tied[1] if self._tied[0] == of else make()
 
     def mesh(self, name: str, body: SolidBody) -> LoadedMesh | None:
-        """The mesh, if the last body of this name had it; of files, which may have changed, none is known."""
+        """The mesh, if the first body of this name had it."""
         last = self._last.get(name)
-        if last is None or body.file is not None or last.table.file is not None:
-            return None
-        same = last.table.mesh == body.mesh and last.table.points == body.points and last.table.model == body.model
-        return last.mesh if same else None
+        return last.mesh if last is not None and last.meshed == mesh_follows_from(body) else None
 
-    def built(self, name: str, body: SolidBody, material: Material, offset: int) -> BuiltBody | None:
+    def built(self, name: str, body: SolidBody, material: Material, mesh: LoadedMesh, offset: int) -> BuiltBody | None:
         """The body, if all of it is as it was."""
         last = self._last.get(name)
-        if last is None or body.file is not None or (last.table, last.material) != (body, material):
+        if last is None or last.mesh is not mesh or (last.table, last.material) != (body, material):
             return None
         return last.built if last.built.offset == offset else None
 
     def keep(self, name: str, body: SolidBody, material: Material, mesh: LoadedMesh, built: BuiltBody) -> None:
         """The first of a name is known from now on: the others are varied from it and back."""
-        self._last.setdefault(name, _Known(body, material, mesh, built))
+        self._last.setdefault(name, _Known(body, mesh_follows_from(body), material, mesh, built))
 
 
 def build_bodies(case: Case, mu: float | None = None, known: KnownBodies | None = None) -> dict[str, BuiltBody]:
@@ -165,7 +174,7 @@ def _solid(case: Case, name: str, body: SolidBody, offset: int, known: KnownBodi
     if body.file is not None:
         refuse_too_many_read(f"bodies.{name}", body.file, loaded.mesh.points.size, offset)
     material = _material(case, name, body, loaded)
-    if (before := known.built(name, body, material, offset)) is not None:
+    if (before := known.built(name, body, material, loaded, offset)) is not None:
         return before
     matrices = assemble_solid(
         loaded.mesh, material, model=body.model, thickness=body.thickness, lumped=body.mass == "lumped"

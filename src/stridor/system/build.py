@@ -32,7 +32,7 @@ from .model import CubicSprings, Line, Solid, System
 from .motion import FreeStructure, PrescribedMotion, constrain, distance_name
 from .pairs import is_held, is_point_on_line, point_contact, surface_contact
 from .same_place import require_places_of_their_own
-from .supports import Tied, constraints_of, tie_matrix
+from .supports import Tied, constraints_of, tie_matrix, tied_by
 from .view import View
 
 
@@ -52,11 +52,12 @@ def build_system(
         raise CaseError("case", kind_of(case), accepted)
     NUMBER.or_none().require(mu, "mu")
     stage("matrices of the bodies")
+    known = known or KnownBodies()
     bodies = build_bodies(case, mu, known)
     total = sum(body.size for body in bodies.values())
     links = links_of(case, bodies, total)
     constraints = constraints_of(case, bodies)
-    tied = tie_matrix(case, bodies, total, constraints)
+    tied = known.tied(tied_by(case, bodies, constraints), lambda: tie_matrix(case, bodies, total, constraints))
     tie, followers = (None, np.zeros(0, dtype=np.int64)) if tied is None else (tied.matrix, tied.followers)
     structure = _structure(bodies, links, tied)
     free, motion = constrain(structure, constraints, followers, _translations(bodies, total))

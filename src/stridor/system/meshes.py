@@ -107,6 +107,12 @@ def _loaded(name: str, body: SolidBody) -> LoadedMesh:
     return loaded
 
 
+def mesh_follows_from(body: SolidBody) -> tuple[object, ...]:
+    """All that the mesh of a body depends on, to compare with that of a like body: its tables, and of a file when it
+    was written."""
+    return body.mesh, body.file, body.group, body.scale, body.translation, body.points, body.model, _stamp(body)
+
+
 def _stamp(body: SolidBody) -> tuple[int, int]:
     """When the file of a body's mesh was written, and its size: one that changed is read again."""
     try:

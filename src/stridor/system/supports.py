@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -196,6 +196,28 @@ def tie_matrix(
         led[changed] = 1.0
         shares = sp.csr_array((sp.diags_array(keep) @ shares + sp.diags_array(led)) @ _shared(matrix, changed))
     return Tied(matrix, followers, shares, tuple(words), tuple(repeats))
+
+
+def tied_by(case: Case, bodies: Mapping[str, BuiltBody], constraints: Sequence[Constraint]) -> tuple[object, ...]:
+    """All that `tie_matrix` follows from, to compare with that of a like case: of bodies their places among the
+    freedoms, and the meshes themselves, which are the same where nothing of them differs."""
+    if not case.ties:
+        return ()
+    meshes = tuple((name, body.offset, body.size, _Itself(body.mesh)) for name, body in bodies.items())
+    boundaries = tuple(case.location(at) for tie in case.ties.values() for at in (tie.slave, tie.master))
+    return dict(case.ties), boundaries, meshes, tuple(constraints)
+
+
+class _Itself:
+    """An object that is equal to itself alone, and is kept."""
+
+    def __init__(self, held: object) -> None:
+        self._held = held
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Itself) and other._held is self._held
+
+    __hash__ = None  # type: ignore[assignment]
 
 
 def _shared(matrix: Sparse, changed: IntArray) -> Sparse:
