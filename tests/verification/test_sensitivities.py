@@ -12,7 +12,7 @@ from stridor.case import Case, loads
 from stridor.direct import nearby
 from stridor.errors import CaseError
 from stridor.modal.complex_modes import complex_modes
-from stridor.modal.derivatives import by_release, pencil_of, solve_mode
+from stridor.modal.derivatives import by_release, pencil_of, solve_mode, solve_mode_released
 from stridor.study.analyses import modes
 from stridor.study.damping_map import damping_map
 from stridor.study.sensitivities import Linearised, number_at, sensitivities
@@ -242,6 +242,11 @@ def test_contact_taken_away_where_it_matters_little(stiffness):
     for column in linear.columns("all"):
         mode = linear.known(column)
         moved = by_release(terms, mode, [np.array([place])], linear.gap(column))[0]
+        # With the factors that the mode itself is found with.
+        again, at_once = solve_mode_released(terms, mode.eigenvalue, linear.gap(column), [np.array([place])])
+        assert again.eigenvalue == pytest.approx(mode.eigenvalue, rel=1e-11)
+        assert again.right.force * again.left.force == pytest.approx(mode.right.force * mode.left.force, rel=1e-6)
+        assert at_once[0] == pytest.approx(moved, rel=1e-5)
         if abs(moved) < 2e-3 * abs(mode.eigenvalue) and abs(moved) > 1e-7 * abs(mode.eigenvalue):
             actual = lam[np.argmin(np.abs(lam - mode.eigenvalue - moved))] - mode.eigenvalue
             assert abs(moved - actual) < 0.03 * abs(actual)

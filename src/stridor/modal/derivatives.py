@@ -17,6 +17,7 @@ Each mode costs one factorisation (`inverse_iteration`).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -32,7 +33,7 @@ from .krylov.problem import problem_held
 from .krylov.steady import contact_rows, steadiness, touching_nodes
 from .options import Options
 from .pencil import Pencil
-from .quadratic.inverse_iteration import Iterated, two_sided
+from .quadratic.inverse_iteration import Factors, Iterated, iterated, two_sided
 from .quadratic.problem import times
 
 BELIEVED = 1e-7  # relative change of λ, or distance from the guess, above which it has gone elsewhere
@@ -203,14 +204,25 @@ def by_release(
     """
     if not groups:
         return np.zeros(0, dtype=complex)
-    problem, n, scale = pencil.whole, pencil.size, pencil.unit
+    side = _beside(mode.eigenvalue, gap)
+    with factorise(pencil.whole.at(mode.eigenvalue + side), saddle=True, solver=solver) as factor:
+        return _released(pencil, mode, groups, factor, side)
+
+
+def _beside(lam: complex, gap: float) -> complex:
+    """Near enough that G does not change, far enough that its digits are left beside those of the pole."""
+    return 1j * BESIDE * min(gap, abs(lam))
+
+
+def _released(
+    pencil: Pencil, mode: Mode, groups: Sequence[IntArray], factor: Factors, side: complex
+) -> ComplexArray:
+    """`by_release` with factors of P(λ₀ + side)."""
+    n, scale = pencil.size, pencil.unit
     nodes = np.unique(np.concatenate(groups))
-    # Near enough that G does not change, far enough that its digits are left beside those of the pole.
-    side = 1j * BESIDE * min(gap, abs(mode.eigenvalue))
-    unit = np.zeros((problem.size, len(nodes)), dtype=complex)
+    unit = np.zeros((pencil.whole.size, len(nodes)), dtype=complex)
     unit[n + nodes, np.arange(len(nodes))] = scale
-    with factorise(problem.at(mode.eigenvalue + side), saddle=True, solver=solver) as factor:
-        answer = scale * factor.solve(unit)[n + nodes]
+    answer = scale * factor.solve(unit)[n + nodes]
     regular = answer - np.outer(mode.right.force[nodes], mode.left.force[nodes]) / side
     found = np.zeros(len(groups), dtype=complex)
     for k, group in enumerate(groups):
@@ -287,14 +299,37 @@ def solve_mode(pencil: Pencil, guess: complex, gap: float, *, solver: str | None
             found = two_sided(pencil.whole, guess, None, None, beside=shift, solver=solver)
         except SingularMatrix:
             found = None
-        converged = found is not None and found.change <= BELIEVED * abs(found.lam)
-        if found and converged and abs(found.lam - guess) <= max(BELIEVED * size, 0.3 * min(gap, 1e-3 * size)):
+        if found and _believed(found, guess, gap):
             return _mode(pencil, found)
         shift *= WIDENED
     raise AnalysisError(
         f"the eigenvalue {guess:.6g} 1/s cannot be told from its neighbour: at an exceptional point, or of two equal "
         "bodies, derivatives do not exist; move μ a little"
     )
+
+
+def solve_mode_released(
+    pencil: Pencil, guess: complex, gap: float, groups: Sequence[IntArray], *, solver: str | None = None
+) -> tuple[Mode, ComplexArray]:
+    """`solve_mode` and `by_release` of it, with the same factors where they serve both. Raises what these raise."""
+    side = _beside(guess, gap)
+    if groups and side:
+        stage(f"mode at {abs(guess.imag) / 6.283185307179586:.6g} Hz with both vectors, and with less contact")
+        x, y = np.random.default_rng(0).standard_normal((2, pencil.whole.size)) + 0j
+        with suppress(SingularMatrix), factorise(pencil.whole.at(guess + side), saddle=True, solver=solver) as factor:
+            found = iterated(pencil.whole, factor, guess, x, y)
+            if found is not None and _believed(found, guess, gap):
+                mode = _mode(pencil, found)
+                return mode, _released(pencil, mode, groups, factor, guess + side - mode.eigenvalue)
+    mode = solve_mode(pencil, guess, gap, solver=solver)
+    return mode, by_release(pencil, mode, groups, gap, solver=solver)
+
+
+def _believed(found: Iterated, guess: complex, gap: float) -> bool:
+    """Whether an iteration has settled, and at the eigenvalue that it was sent to."""
+    size = max(abs(guess), 1e-300)
+    settled = found.change <= BELIEVED * abs(found.lam)
+    return settled and abs(found.lam - guess) <= max(BELIEVED * size, 0.3 * min(gap, 1e-3 * size))
 
 
 def _mode(pencil: Pencil, found: Iterated) -> Mode:

@@ -18,7 +18,7 @@ from ..modal.krylov.steady import refuse_stick
 from ..notebook import counted
 from ..system.imported import ImportedTerm, load_terms
 from .asked import names_of, require_choice, require_count, require_frequency
-from .measure_ranking import Ranking
+from .measure_ranking import Ranking, edges_of
 from .measure_verification import verified
 from .measures import Countermeasures, Measure, Target, Verified
 from .provenance import provenance
@@ -88,7 +88,9 @@ def rank_countermeasures(
         branches = ", ".join(str(b) for b in linear.modes.branch[unstable])
         raise CaseError("target", target, f"not an unstable branch, {branches}; without one all of these together")
     band = linear.columns("all") if watch == "all" else unstable
-    ranking = Ranking(linear, [b for b in band if linear.mode(b) is not None], target, percent, margin)
+    edges = edges_of(linear, chamfers) if chamfers else []
+    groups = [edge.nodes for edge in edges]
+    ranking = Ranking(linear, [b for b in band if linear.mode(b, groups) is not None], target, percent, margin)
     if not ranking.aimed.any():
         what = "the unstable modes have" if target == "sum" else f"mode {target} has"
         told = (*linear.warnings, f"{what} no derivatives, and changes are ranked by them: nothing is ranked")
@@ -99,8 +101,8 @@ def rank_countermeasures(
     found = ranking.numbers(default_numbers(case, left) if numbers is None else names_of(numbers, "numbers", none=True))
     if added_mass:
         found += ranking.masses()
-    if chamfers > 0:
-        found += ranking.chamfers(chamfers)
+    if edges:
+        found += ranking.chamfers(edges)
     acting = [m for m in found if abs(m.removed_per_percent) > ranking.rounding]
     helping = sorted((m for m in acting if m.removed_per_percent > 0), key=lambda m: -m.removed_per_percent)
     told = [] if helping else [_none_helps(case, len(found), left)]

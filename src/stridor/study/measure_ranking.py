@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..modal.derivatives import Mode, PencilChange, by_mass_at_node, by_release
+from ..modal.derivatives import Mode, PencilChange, by_mass_at_node
 from ..modal.tolerances import UNSTABLE_RELATIVE
 from ..system import System
 from ..system.bodies import build_bodies
@@ -67,32 +67,11 @@ class Ranking:
             found.append(replace(measure, position=at, mass=mass))
         return found
 
-    def chamfers(self, rows: int) -> list[Measure]:
-        """Rows of contact nodes taken away at both edges of every contact over a surface."""
-        linear = self.linear
-        nodes = linear.system.contact_nodes()
-        names: list[str] = []
-        groups: list[IntArray] = []
-        shares: list[float] = []
-        for contact in range(len(nodes.names)):
-            for edge in ("leading", "trailing"):
-                for cut in edge_rows(nodes, linear.held.touching, linear.held.sense, contact, edge, rows):
-                    many = "row" if cut.rows == 1 else "rows"
-                    names.append(f"{nodes.names[contact]}, {edge} edge, {cut.rows} {many}")
-                    groups.append(cut.released)
-                    shares.append(100 * cut.share)
-        if not groups:
-            return []
-        moved = np.array(
-            [
-                by_release(linear.pencil, m, groups, linear.gap(b), solver=linear.options.solver)
-                for m, b in zip(self.modes, self.columns, strict=True)
-            ]
-        )
-        return [
-            self._measure("chamfer", name, 1, share, moved[:, k])
-            for k, (name, share) in enumerate(zip(names, shares, strict=True))
-        ]
+    def chamfers(self, edges: Sequence[Edge]) -> list[Measure]:
+        """Rows of contact nodes taken away at edges of contacts over a surface, those that the modes were asked for
+        with."""
+        moved = np.array([self.linear.released(b) for b in self.columns])
+        return [self._measure("chamfer", edge.name, 1, edge.percent, moved[:, k]) for k, edge in enumerate(edges)]
 
     def _measure(self, kind: Kind, name: str, direction: int, percent: float, moved: ComplexArray) -> Measure:
         after: ComplexArray = self.predicted(moved)
@@ -131,6 +110,28 @@ class Ranking:
             root = root if abs(root - half) <= abs(root + half) else -root
             after[i] = (lam[i] + lam[j] + moved[i] + moved[j]) / 2 + root
         return after
+
+
+@dataclass(frozen=True)
+class Edge:
+    """Rows of touching nodes (r,) at an edge of a contact, of the m, and which part of it [%]."""
+
+    name: str
+    nodes: IntArray
+    percent: float
+
+
+def edges_of(linear: Linearised, rows: int) -> list[Edge]:
+    """Both edges of every contact over a surface, of one to ``rows`` rows."""
+    nodes = linear.system.contact_nodes()
+    found: list[Edge] = []
+    for contact in range(len(nodes.names)):
+        for edge in ("leading", "trailing"):
+            for cut in edge_rows(nodes, linear.held.touching, linear.held.sense, contact, edge, rows):
+                many = "row" if cut.rows == 1 else "rows"
+                name = f"{nodes.names[contact]}, {edge} edge, {cut.rows} {many}"
+                found.append(Edge(name, cut.released, 100 * cut.share))
+    return found
 
 
 def drawn_bodies(system: System) -> list[tuple[Line | Solid, Array, int]]:

@@ -29,6 +29,7 @@ from ..modal.derivatives import (
     rate_from_zero,
     rate_of,
     solve_mode,
+    solve_mode_released,
 )
 from ..modal.growing import doubt
 from ..modal.pencil import Pencil
@@ -36,7 +37,7 @@ from ..sliding import share_factors, steady_nodes
 from ..system import System, build_system
 from ..system.bodies import KnownBodies
 from ..system.imported import cleaned
-from ..typing import Array, ComplexArray
+from ..typing import Array, ComplexArray, IntArray
 from .analyses import modes as modes_at
 from .asked import names_of, require_band, require_friction
 from .provenance import provenance
@@ -192,6 +193,7 @@ class Linearised:
         self.warnings: list[str] = [f"modes at μ = {mu:g}: {doubtful}"] if doubtful else []
         self.warnings += work.one_for_all
         self._solved: dict[int, Mode | None] = {}
+        self._released: dict[int, ComplexArray] = {}
         # At the case's own friction a number of its laws, or what slides faster, changes that friction, too.
         self.by_law = any(c.friction.law != "coulomb" for c in self.case.contacts.values())
         own = work.own_friction if self.by_law else None
@@ -368,8 +370,9 @@ class Linearised:
         distance[column] = np.inf
         return int(np.argmin(distance)) if len(distance) > 1 else None
 
-    def mode(self, column: int) -> Mode | None:
-        """A mode with its vectors; None, and a warning, where it has no derivatives."""
+    def mode(self, column: int, groups: Sequence[IntArray] = ()) -> Mode | None:
+        """A mode with its vectors; None, and a warning, where it has no derivatives. groups: of touching nodes, which
+        `released` is going to be asked of."""
         if column not in self._solved:
             lam = complex(self.eigenvalues[column])
             name = f"mode {self.modes.branch[column]} ({measured(lam.imag / (2 * np.pi), 1)} Hz)"
@@ -377,11 +380,19 @@ class Linearised:
                 if self.gap(column) <= REPEATED * abs(lam):
                     raise AnalysisError("two eigenvalues are equal, and derivatives belong to neither")
                 solver = self.options.solver
-                self._solved[column] = solve_mode(self.pencil, lam, self.gap(column), solver=solver)
+                if groups:
+                    found = solve_mode_released(self.pencil, lam, self.gap(column), groups, solver=solver)
+                    self._solved[column], self._released[column] = found
+                else:
+                    self._solved[column] = solve_mode(self.pencil, lam, self.gap(column), solver=solver)
             except AnalysisError as error:
                 self.warnings.append(f"{name} is left out: {error}")
                 self._solved[column] = None
         return self._solved[column]
+
+    def released(self, column: int) -> ComplexArray:
+        """What taking contact away from each of the groups that the mode was asked for with does to λ (g,) [1/s]."""
+        return self._released[column]
 
     def known(self, column: int) -> Mode:
         """A mode that is known to have derivatives."""
