@@ -42,7 +42,7 @@ from .analyses import modes as modes_at
 from .asked import names_of, require_band, require_friction
 from .provenance import provenance
 from .sensitivity_result import Sensitivities
-from .workspace import Problem, Workspace, friction_in_sliding, frictions_in_sliding
+from .workspace import Problem, Workspace, different_friction, friction_in_sliding, frictions_in_sliding
 
 NEAR = 0.05  # relative change of a number within which an exceptional point is told of
 BENT = 2.0  # condition number from which two close modes are on their way to an exceptional point
@@ -216,7 +216,8 @@ class Linearised:
         require_friction(mu, several=False)
         value = work.own_friction if mu is None else float(mu)
         if value is None:
-            raise CaseError("mu", None, "one friction coefficient for all contacts: the case gives them different ones")
+            accepted = f"one friction coefficient for all contacts, since {different_friction(work.system())}"
+            raise CaseError("mu", None, accepted)
         damped = work.modal.damped if damped is None else damped
         modes = modes_at(work, value, count=count, max_frequency_hz=max_frequency_hz, damped=damped)
         return Linearised(work, value, modes, damped=damped)

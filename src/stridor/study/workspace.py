@@ -38,6 +38,7 @@ from .options import options_of
 from .settings import phases_of
 
 SYSTEMS = 16  # kept at the same time, of a case whose matrices depend on μ
+SAME_FRICTION = 1e-6  # of a coefficient: two nodes of a law of speed that differ by less have one
 KEPT_BY = "`modes`, `steady` and `simulate` without μ answer with each contact's own"
 ACCEPTED = "a case, the path of its file, a system or a workspace"
 
@@ -203,10 +204,7 @@ class Workspace(Shown):
         found = self.own_friction
         if found is None:
             raise CaseError(
-                "mu",
-                None,
-                "one friction coefficient for all contacts, since the case gives them different ones: name it "
-                f"(--mu 0.3), every contact with friction then has it; {KEPT_BY}",
+                "mu", None, f"one friction coefficient for all contacts, since {different_friction(self.system())}"
             )
         return found
 
@@ -216,7 +214,7 @@ class Workspace(Shown):
         if not self.has_contacts or (self._case is not None and len(self._case.contacts) < 2):
             return ()
         own = frictions_by_contact(self.system()) or {}
-        if len(own) < 2 or max(own.values()) - min(own.values()) <= 1e-12 * max(own.values()):
+        if len(own) < 2 or _one(np.array(list(own.values()))):
             return ()
         given = ", ".join(f"{name} {value:g}" for name, value in own.items())
         nodes = self.system().contact_nodes()
@@ -285,23 +283,47 @@ def friction_in_sliding(system: System) -> float | None:
     found = frictions_in_sliding(system)
     if not len(found):
         return 0.0
-    return float(found[0]) if np.ptp(found) <= 1e-12 * np.max(np.abs(found)) else None
+    return float(found[0]) if _one(found) else None
 
 
-def frictions_by_contact(system: System) -> dict[str, float] | None:
-    """The coefficient of each contact with friction, in steady sliding; None where one has several, by its law."""
+def _one(coefficients: Array) -> bool:
+    """Whether they are one but for the slip speeds that the facets of a curved contact give it."""
+    return bool(np.ptp(coefficients) <= SAME_FRICTION * np.max(np.abs(coefficients)))
+
+
+def different_friction(system: System) -> str:
+    """Which contacts have different coefficients in steady sliding, or which one has several, and what to do."""
+    own, named = frictions_by_contact(system), "name it (--mu 0.3), every contact with friction then has it"
+    if own is not None:
+        return f"the case gives them different ones: {named}; {KEPT_BY}"
+    several = [f"{name} {low:g} to {high:g}" for name, (low, high) in _ranges(system).items() if high > low]
+    return (
+        f"the law of a contact gives its nodes several, by their slip speeds ({', '.join(several)}): {named}; "
+        "`steady` and `simulate` without μ answer with those of the law"
+    )
+
+
+def _ranges(system: System) -> dict[str, tuple[float, float]]:
+    """The least and the largest coefficient of each contact with friction, in steady sliding; the same where they are
+    one."""
     nodes = system.contact_nodes()
     speeds = np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1)
+    # The centre of a turning surface slides at no speed and has no say.
     all_found, moving = nodes.friction_coefficients(speeds), speeds > 1e-9 * speeds.max(initial=0.0)
-    rubs, found = nodes.share > 0.0, dict[str, float]()
+    rubs, found = nodes.share > 0.0, dict[str, tuple[float, float]]()
     for k, name in enumerate(nodes.names):
         mine = rubs & (nodes.owner == k)
         own = all_found[mine & moving] if np.any(mine & moving) else all_found[mine]
         if len(own):
-            if np.ptp(own) > 1e-12 * np.max(np.abs(own)):
-                return None
-            found[name] = float(own[0])
+            low, high = (own[0], own[0]) if _one(own) else (own.min(), own.max())
+            found[name] = float(low), float(high)
     return found
+
+
+def frictions_by_contact(system: System) -> dict[str, float] | None:
+    """The coefficient of each contact with friction, in steady sliding; None where one has several, by its law."""
+    found = _ranges(system)
+    return None if any(high > low for low, high in found.values()) else {name: low for name, (low, _) in found.items()}
 
 
 def in_proportion(system: System) -> tuple[System, float] | None:

@@ -66,8 +66,10 @@ def extrapolated(pieces_at: Pieces, parameters: tuple[Parameter, ...], values: M
     terms, pieces = interpolated_terms(pieces_at, parameters), pieces_at(values).values()
     worst = 0.0
     for role in sorted({part.role for part in pieces}):
-        ours = sum((t.factor(values) * t.matrix for t in terms if t.role == role), start=0.0)
-        truth = sum((part.factor(values) * part.matrix for part in pieces if part.role == role), start=0.0)
+        mine = [part for part in pieces if part.role == role]
+        nothing = sp.csr_array(mine[0].matrix.shape)  # zero terms, of no damping, are left out
+        ours = sum((t.factor(values) * t.matrix for t in terms if t.role == role), start=nothing)
+        truth = sum((part.factor(values) * part.matrix for part in mine), start=nothing)
         worst = max(worst, deviation(ours, truth))
     return worst
 
