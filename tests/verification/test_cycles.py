@@ -35,6 +35,7 @@ from stridor.periodic import (
     turning,
 )
 from stridor.periodic.chart import Chart
+from stridor.periodic.cycle import turns
 from stridor.periodic.shooting import shoot, started
 from stridor.study.cycle_branches import Tracer
 from stridor.study.cycle_methods import Shooting
@@ -513,6 +514,47 @@ def test_ranges_are_those_of_the_motion_not_of_its_samples(monkeypatch: pytest.M
             assert np.abs(getattr(coarse, name) - wanted).max() < 1e-4 * np.ptp(wanted)
     assert max(missed) > 0.05
     assert fine.slip_amplitude == pytest.approx(0.5 * np.ptp(fine.slip_velocity), rel=1e-4)
+
+
+def test_a_long_cycle_has_as_many_samples_as_its_strokes_ask_for(tmp_path: Path):
+    """Sixteen rounds as one period: its extrema are those of one round, in its samples and in its file."""
+    family = Family(st.Workspace(mode_coupling(DAMPED, 0.1)).system())
+    closed = cycles_reached(family.at(1.4), pushed(family.at(1.4), 0.2))[-1]
+    once = sampling.sampled(closed, "")
+    rounds = sampling.sampled(close(closed.problem, closed.chart, closed.xi, 16 * closed.period), "")
+    assert len(once.time) == 512
+    assert 2048 <= len(rounds.time) <= 4096
+    for cycle in (once, rounds):
+        assert "separation" in cycle.kinds
+        size = float(np.ptp(once.force_range))
+        assert cycle.force_range[0].tolist() == pytest.approx(once.force_range[0].tolist(), abs=1e-6 * size)
+        ends = cycle.normal_force.min(), cycle.normal_force.max()
+        assert ends == pytest.approx(cycle.force_range[0].tolist(), abs=3e-4 * size)
+        assert cycle.force_range[0, 0] == ends[0] == 0.0  # no contact pulls, not even by rounding
+        for one, other in ((f(cycle.displacement, axis=0), f(once.displacement, axis=0)) for f in (np.min, np.max)):
+            assert np.abs(one - other).max() < 3e-4 * np.ptp(once.displacement, axis=0).min()
+    both = Cycles((once, rounds), (), (), None)
+    st.save(both, tmp_path / "cycles.nc")
+    back = st.open(tmp_path / "cycles.nc")
+    assert isinstance(back, Cycles)
+    for one, other in zip(back.cycles, both.cycles, strict=True):
+        for name in ("time", "normal_force", "status", "displacement", "acceleration"):
+            assert np.array_equal(getattr(one, name), getattr(other, name))
+
+
+@pytest.mark.parametrize(
+    ("values", "wanted"),
+    [
+        ([[0.0, 1.0, 0.0, 1.0, 0.0]], 3),
+        ([[0.0, 1.0, 2.0], [0.0, 1.0, 0.0]], 1),
+        ([[1.0, 1.0, 1.0]], 0),
+        ([[0.0, 1.0, 0.995, 1.0, 0.0]], 1),
+        ([[0.0, 1.0, 1.0, 0.0, 0.0, 1.0]], 2),
+        ([[3.0]], 0),
+    ],
+)
+def test_turns_are_counted_without_ripples(values: list[list[float]], wanted: int):
+    assert turns(np.array(values).T) == wanted
 
 
 def test_a_search_that_time_ends_says_so():
