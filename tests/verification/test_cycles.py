@@ -542,6 +542,44 @@ def test_a_long_cycle_has_as_many_samples_as_its_strokes_ask_for(tmp_path: Path)
             assert np.array_equal(getattr(one, name), getattr(other, name))
 
 
+def test_a_motion_that_begins_at_rest_leads_to_a_cycle_of_its_own():
+    """Of a mass that sticks, slips and parts three cycles are stable. To the slowest one three of four random pushes of
+    0.3 came in time steps of Moreau's (period 25.46), and of the starts here the one in which slip is stopped alone."""
+    angle = math.atan2(0.4737547006719889, 0.8806568478080405)
+    case = st.Case(
+        units="nondimensional",
+        bodies={
+            "m": {"type": "mass", "mass": 1.227708663346671, "position": (0, 0)},
+            "belt": {"type": "obstacle", "shape": "flat", "point": (0, 0), "normal": (0, 1),
+                     "sliding": {"velocity": (-0.4768922512117597, 0)}},
+        },
+        springs={
+            "soft": {"between": ("m", "ground"), "direction": (-math.cos(angle), math.sin(angle)),
+                     "stiffness": 0.18466528979451513},
+            "hard": {"between": ("m", "ground"), "direction": (math.cos(angle), math.sin(angle)),
+                     "stiffness": 2.8277025938204416},
+        },
+        dashpots={
+            "x": {"between": ("m", "ground"), "direction": (1, 0), "damping": 0.02227597409107484},
+            "y": {"between": ("m", "ground"), "direction": (0, 1), "damping": 0.02648781063019178},
+        },
+        loads={"press": {"at": "m", "force": (0, -0.5275591132430684)}},
+        contacts={"rub": {"slave": "m", "master": "belt", "stiffness": 1.3614429939657835, "friction": {
+            "law": "static-kinetic", "coefficient": 1.352107865204884, "static_coefficient": 1.459399935020449}}},
+        modal={"max_frequency_hz": 2.0},
+        temporal={"stepper": "exact", "watch": ["m"]},
+    )  # fmt: skip
+    found = st.cycles(case, 1.352107865204884)
+    assert not found.missing
+    assert [c.stable for c in found.cycles] == [True, True, True]
+    assert sorted(c.period for c in found.cycles) == pytest.approx([4.9269, 8.8998, 25.4578], abs=1e-3)
+    slow = max(found.cycles, key=lambda c: c.period)
+    assert slow.reached_from == "a push of -0.4769 m/s"
+    x, y = slow.displacement[:, 0].T
+    # What those steps came to, of 2.5e-4.
+    assert (x.min(), x.max(), y.min(), y.max()) == pytest.approx((-0.7103, 0.4446, -0.8425, 1.0465), abs=2e-3)
+
+
 @pytest.mark.parametrize(
     ("values", "wanted"),
     [
