@@ -87,7 +87,7 @@ def test_cycles_told_are_those_of_the_package(start: Any, wanted: Any) -> None:
     assert found == [json.loads(json.dumps(cycle_shown(c).to_json())) for c in wanted.cycles]
     assert end["sentence"] == wanted.sentence
     assert (end["missing"], end["notes"]) == (wanted.missing, wanted.notes)
-    assert any("motion 1 of 3 at μ = 1.2, from the mode at " in words for words in told.all("log"))
+    assert any("motion 1 of 4 at μ = 1.2, from the mode at " in words for words in told.all("log"))
 
 
 def test_a_cycle_in_plain_numbers_is_the_cycle(wanted: Any) -> None:
@@ -186,7 +186,7 @@ def test_where_every_motion_dies_out_that_is_said(browser: Any, coupled: str) ->
         page.click("#st-cycle-go")
         wait(page, ENDED)
         expect(page.locator("#st-cycle-said")).to_have_text(f"At μ = {QUIET} no limit cycle was found.")
-        expect(page.locator("#st-cycle-more summary")).to_have_text("2 motions died out")
+        expect(page.locator("#st-cycle-more summary")).to_have_text("3 motions died out")
         assert page.evaluate(LABELS) == []
 
 

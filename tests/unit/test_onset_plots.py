@@ -65,8 +65,9 @@ def test_modes_at_points_leave_out_what_a_point_has_not(case: st.Case) -> None:
         np.ones(2, bool), np.zeros(2, int),
     )  # fmt: skip
     figure = modes_at_points(found)
-    assert drawn(figure, "unstable") == [(0.1, 0.1)]
-    assert drawn(figure, "decays") == [(0.1, 0.2), (0.2, 0.11)]
+    assert figure.axes[0].get_ylabel() == "frequency [Hz]"
+    assert drawn(figure, "unstable") == [(0.1, 100.0)]
+    assert drawn(figure, "decays") == [(0.1, 200.0), (0.2, 110.0)]
     assert figure.axes[-1].get_xlabel() == "mu"
     assert found.counts() == [2, 1]
 

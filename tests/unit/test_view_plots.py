@@ -23,8 +23,10 @@ from stridor.temporal.energy import EnergyBalance, energy_balance
 from stridor.temporal.growth import Growth
 from stridor.temporal.signals import Components, spectrogram, spectrum
 from stridor.temporal.trajectory import ContactStatistics, PhaseResult, Trajectory
-from stridor.view import plots
+from stridor.view import plots, units
+from stridor.view.interface_columns import columns_along
 from stridor.view.shape_plots import at_best_phase
+from stridor.view.temporal_tables import energy_table
 from stridor.view.windows import regime_window
 
 HZ = 2 * np.pi
@@ -386,3 +388,86 @@ def test_labels_of_onsets_cover_neither_each_other_nor_an_onset(count: int, unna
     left = count - len(boxes)
     assert (left > 0) is bool(unnamed)
     assert ("onset, solved" + (f" ({left} without room for their values)" if left else "")) in words
+
+
+@pytest.mark.parametrize(("slower", "frequency", "time"), [(1.0, "kHz", "ms"), (1e4, "Hz", "s")])
+def test_axes_of_a_model_of_order_one_have_no_thousands(slower: float, frequency: str, time: str) -> None:
+    """The same run ten thousand times slower, as without units: 0.1 Hz for 2000 s instead of 1 kHz for 0.2 s."""
+    run = trajectory()
+    run = replace(run, time=slower * run.time, step=slower * run.step)
+    top = 5e3 / slower
+    signal = run.acceleration[:, 0, 0]
+    window = 0.16 * slower, 0.163 * slower
+    seen = perturbation()
+    seen = replace(seen, eigenvalue=seen.eigenvalue / slower, sampling=seen.sampling * slower)
+    modes = replace(sweep(), eigenvalues=sweep().eigenvalues / slower)
+    reach = 40e3 / slower
+    curve = np.linspace(1e3, 20e3, 50) / slower
+    of_frequency = (
+        (plots.spectrum_plot({"a": spectrum(signal, run.sampling)}, max_frequency_hz=top), "x", 5.0),
+        (plots.spectrogram_plot(spectrogram(signal, run.sampling, resolution_hz=100 / slower), max_frequency_hz=top),
+         "y", 5.0),
+        (plots.friction_curve(np.linspace(0.1, 0.5, 50), curve), "x", 20.0),
+        (plots.spectrum_map(modes, seen.components, max_frequency_hz=reach), "x", 40.0),
+        (plots.root_locus(modes, max_frequency_hz=reach), "y", 40.0),
+    )  # fmt: skip
+    factor = 1.0 if slower == 1.0 else 1e3 / slower  # numbers in Hz of what was in kHz
+    for figure, axis, end in of_frequency:
+        ax = figure.axes[0] if len(figure.axes) == 1 or figure.axes[0].get_xlabel() else figure.axes[-1]
+        label, limits = (ax.get_xlabel(), ax.get_xlim()) if axis == "x" else (ax.get_ylabel(), ax.get_ylim())
+        assert label == f"frequency [{frequency}]"
+        assert limits[1] == pytest.approx(end * factor, rel=0.02)
+    for figure, width in ((plots.contact_force_and_velocity(run, window), 3.0), (plots.perturbation_growth(seen), 8.0)):
+        low, high = figure.axes[-1].get_xlim()
+        assert figure.axes[-1].get_xlabel() == f"time [{time}]"
+        assert high - low == pytest.approx(width if time == "ms" else 1e-3 * slower * width, rel=0.02)
+    legend = plots.acceleration_history(run, max_frequency_hz=top).axes[0].get_legend()
+    assert legend is not None
+    assert [t.get_text() for t in legend.get_texts()] == ["all frequencies", f"up to {5 * factor:g} {frequency}"]
+
+
+@pytest.mark.parametrize(
+    ("unit", "usual", "large"),
+    [
+        (units.frequency_unit, (40e3, 1e3, "kHz"), (0.5, 1.0, "Hz")),
+        (units.time_unit, (0.2, 1e-3, "ms"), (157.0, 1.0, "s")),
+        (units.length_unit, (0.3, 1e-3, "mm"), (2.0, 1.0, "m")),
+        (units.gap_unit, (3e-6, 1e-6, "µm"), (0.7, 1e-3, "mm")),
+        (units.gap_unit, (0.0, 1e-6, "µm"), (3.0, 1.0, "m")),
+        (units.energy_unit, (5e-3, 1e-3, "mJ"), (15.0, 1.0, "J")),
+        (units.pressure_unit, (2e6, 1e6, "MPa"), (0.5, 1.0, "Pa")),
+        (units.modulus_unit, (2e11, 1e9, "GPa"), (1.0, 1.0, "Pa")),
+        (units.frequency_unit, (float("nan"), 1e3, "kHz"), (999.0, 1.0, "Hz")),
+    ],
+)
+def test_units_are_chosen_by_size(unit, usual, large) -> None:
+    for size, *named in (usual, large):
+        assert unit(size) == tuple(named)
+
+
+def test_a_time_late_in_a_run_has_no_more_digits_than_it_needs() -> None:
+    assert units.time_unit(1e-3, 3.0) == (1e-3, "ms")
+    assert units.time_unit(0.5, 2000.0) == (1.0, "s")
+    assert (units.later_words(0.0123, 3), units.later_words(12.3, 3)) == ("12.3 ms", "12.3 s")
+
+
+@pytest.mark.parametrize(("larger", "energy", "length"), [(1.0, "mJ", "mm"), (1e3, "J", "m")])
+def test_energies_and_lengths_of_a_large_model_are_in_whole_units(larger: float, energy: str, length: str) -> None:
+    run = trajectory()
+    scale = 0.01 * larger
+    works = {name: scale * work for name, work in run.works.items()}
+    table = energy_table(balance(replace(run, works=works, kinetic=scale * run.kinetic, elastic=scale * run.elastic)))
+    assert table.heads == ("", f"energy [{energy}]")
+    put_in = next(row.cells[1] for row in table.rows if row.cells[0] == "put in by loads")
+    assert float(put_in) == pytest.approx(20.0)
+    line = np.column_stack([larger * np.linspace(0.0, 0.02, 5), np.zeros(5)])
+    columns = columns_along(line, np.tile([[[1.0, 0.0]]], (5, 1, 1)))
+    assert columns.label == f"position along the contact [{length}]"
+    assert columns.value.max() == pytest.approx(20.0)
+    friction = plots.interface_energy(line, np.ones(5))
+    assert friction.axes[0].get_xlabel() == columns.label
+    assert friction.axes[0].get_title(loc="left") == "friction energy per cycle: +5 J in total"
+    system = small_system()
+    lines = tuple(replace(one, coordinates=larger * one.coordinates) for one in system.lines)
+    drawn = plots.model_plot(replace(system, lines=lines))
+    assert (drawn.axes[0].get_xlabel(), drawn.axes[0].get_ylabel()) == (f"x [{length}]", f"y [{length}]")

@@ -35,6 +35,7 @@ from stridor.periodic import (
     turning,
 )
 from stridor.periodic.chart import Chart
+from stridor.periodic.cycle import turns
 from stridor.periodic.shooting import shoot, started
 from stridor.study.cycle_branches import Tracer
 from stridor.study.cycle_methods import Shooting
@@ -513,6 +514,85 @@ def test_ranges_are_those_of_the_motion_not_of_its_samples(monkeypatch: pytest.M
             assert np.abs(getattr(coarse, name) - wanted).max() < 1e-4 * np.ptp(wanted)
     assert max(missed) > 0.05
     assert fine.slip_amplitude == pytest.approx(0.5 * np.ptp(fine.slip_velocity), rel=1e-4)
+
+
+def test_a_long_cycle_has_as_many_samples_as_its_strokes_ask_for(tmp_path: Path):
+    """Sixteen rounds as one period: its extrema are those of one round, in its samples and in its file."""
+    family = Family(st.Workspace(mode_coupling(DAMPED, 0.1)).system())
+    closed = cycles_reached(family.at(1.4), pushed(family.at(1.4), 0.2))[-1]
+    once = sampling.sampled(closed, "")
+    rounds = sampling.sampled(close(closed.problem, closed.chart, closed.xi, 16 * closed.period), "")
+    assert len(once.time) == 512
+    assert 2048 <= len(rounds.time) <= 4096
+    for cycle in (once, rounds):
+        assert "separation" in cycle.kinds
+        size = float(np.ptp(once.force_range))
+        assert cycle.force_range[0].tolist() == pytest.approx(once.force_range[0].tolist(), abs=1e-6 * size)
+        ends = cycle.normal_force.min(), cycle.normal_force.max()
+        assert ends == pytest.approx(cycle.force_range[0].tolist(), abs=3e-4 * size)
+        assert cycle.force_range[0, 0] == ends[0] == 0.0  # no contact pulls, not even by rounding
+        for one, other in ((f(cycle.displacement, axis=0), f(once.displacement, axis=0)) for f in (np.min, np.max)):
+            assert np.abs(one - other).max() < 3e-4 * np.ptp(once.displacement, axis=0).min()
+    both = Cycles((once, rounds), (), (), None)
+    st.save(both, tmp_path / "cycles.nc")
+    back = st.open(tmp_path / "cycles.nc")
+    assert isinstance(back, Cycles)
+    for one, other in zip(back.cycles, both.cycles, strict=True):
+        for name in ("time", "normal_force", "status", "displacement", "acceleration"):
+            assert np.array_equal(getattr(one, name), getattr(other, name))
+
+
+def test_a_motion_that_begins_at_rest_leads_to_a_cycle_of_its_own():
+    """Of a mass that sticks, slips and parts three cycles are stable. To the slowest one three of four random pushes of
+    0.3 came in time steps of Moreau's (period 25.46), and of the starts here the one in which slip is stopped alone."""
+    angle = math.atan2(0.4737547006719889, 0.8806568478080405)
+    case = st.Case(
+        units="nondimensional",
+        bodies={
+            "m": {"type": "mass", "mass": 1.227708663346671, "position": (0, 0)},
+            "belt": {"type": "obstacle", "shape": "flat", "point": (0, 0), "normal": (0, 1),
+                     "sliding": {"velocity": (-0.4768922512117597, 0)}},
+        },
+        springs={
+            "soft": {"between": ("m", "ground"), "direction": (-math.cos(angle), math.sin(angle)),
+                     "stiffness": 0.18466528979451513},
+            "hard": {"between": ("m", "ground"), "direction": (math.cos(angle), math.sin(angle)),
+                     "stiffness": 2.8277025938204416},
+        },
+        dashpots={
+            "x": {"between": ("m", "ground"), "direction": (1, 0), "damping": 0.02227597409107484},
+            "y": {"between": ("m", "ground"), "direction": (0, 1), "damping": 0.02648781063019178},
+        },
+        loads={"press": {"at": "m", "force": (0, -0.5275591132430684)}},
+        contacts={"rub": {"slave": "m", "master": "belt", "stiffness": 1.3614429939657835, "friction": {
+            "law": "static-kinetic", "coefficient": 1.352107865204884, "static_coefficient": 1.459399935020449}}},
+        modal={"max_frequency_hz": 2.0},
+        temporal={"stepper": "exact", "watch": ["m"]},
+    )  # fmt: skip
+    found = st.cycles(case, 1.352107865204884)
+    assert not found.missing
+    assert [c.stable for c in found.cycles] == [True, True, True]
+    assert sorted(c.period for c in found.cycles) == pytest.approx([4.9269, 8.8998, 25.4578], abs=1e-3)
+    slow = max(found.cycles, key=lambda c: c.period)
+    assert slow.reached_from == "a push of -0.4769 m/s"
+    x, y = slow.displacement[:, 0].T
+    # What those steps came to, of 2.5e-4.
+    assert (x.min(), x.max(), y.min(), y.max()) == pytest.approx((-0.7103, 0.4446, -0.8425, 1.0465), abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("values", "wanted"),
+    [
+        ([[0.0, 1.0, 0.0, 1.0, 0.0]], 3),
+        ([[0.0, 1.0, 2.0], [0.0, 1.0, 0.0]], 1),
+        ([[1.0, 1.0, 1.0]], 0),
+        ([[0.0, 1.0, 0.995, 1.0, 0.0]], 1),
+        ([[0.0, 1.0, 1.0, 0.0, 0.0, 1.0]], 2),
+        ([[3.0]], 0),
+    ],
+)
+def test_turns_are_counted_without_ripples(values: list[list[float]], wanted: int):
+    assert turns(np.array(values).T) == wanted
 
 
 def test_a_search_that_time_ends_says_so():

@@ -44,8 +44,8 @@ def cycles(
         typer.Option(
             "--push",
             metavar="SPEEDS",
-            help="By how much slip velocities are pushed off steady sliding [m/s]: 0.1,0.5 [default: one and three "
-            "times the slip speed].",
+            help="By how much slip velocities are pushed off steady sliding [m/s], against the slip below 0: 0.1,-0.5 "
+            "[default: one and three times the slip speed, and once against it].",
         ),
     ] = None,
     points: Annotated[int, typer.Option("--most", min=2, help="Most cycles of a branch, each way.")] = 120,

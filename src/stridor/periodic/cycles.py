@@ -11,6 +11,7 @@ import numpy as np
 from ..digits import hertz
 from ..notebook import counted, html_table
 from ..tabular import Cell, Rows, Tabular, dataset
+from ..typing import Array
 from .branch import Bifurcation, CycleBranch
 from .cycle import NEUTRAL, Change, Cycle
 from .parting import Unclosed
@@ -177,7 +178,8 @@ class Cycles(Tabular):
 
     def to_xarray(self) -> Any:
         """xarray.Dataset with dimensions cycle, sample (of one period), contact, point, multiplier, as `st.save` writes
-        it; branches, onsets and changes of contact are JSON in the attribute ``cycles``."""
+        it: of cycles with fewer samples than others the last one, at the end of the period, is repeated; branches,
+        onsets and changes of contact are JSON in the attribute ``cycles``."""
         cycles = self.cycles
         names, points = (cycles[0].contact_names, cycles[0].watch_names) if cycles else ((), ())
         most = max((len(c.multipliers) for c in cycles), default=0)
@@ -187,13 +189,17 @@ class Cycles(Tabular):
         variables: dict[str, Any] = {
             name: ("cycle", np.array([getattr(c, name) for c in cycles], dtype=float), _units(name)) for name in NUMBERS
         }
-        variables["time"] = ("cycle", "sample"), _stacked([c.time for c in cycles], 2), {"units": "s"}
+        samples = max((len(c.time) for c in cycles), default=0)
+        times = np.array([_lasting(c.time, samples) for c in cycles]) if cycles else np.zeros((0, 0))
+        variables["time"] = ("cycle", "sample"), times, {"units": "s"}
         variables["multiplier"] = ("cycle", "multiplier_number", "part"), multipliers, {}
         axes = ["x", "y", "z"][: cycles[0].displacement.shape[2] if cycles else 2]
         sizes = {"contact": len(names), "point": len(points), "direction": len(axes), "kind": 3, "end": 2, "sample": 0}
         for name, dims in HISTORIES.items():
             empty = tuple(sizes[d] for d in dims[1:])
-            values = np.array([getattr(c, name) for c in cycles]) if cycles else np.zeros((0, *empty))
+            rows = [getattr(c, name) for c in cycles]
+            rows = [_lasting(row, samples) for row in rows] if "sample" in dims else rows
+            values = np.array(rows) if cycles else np.zeros((0, *empty))
             variables[name] = dims, values.astype(np.int64 if name == "status" else float), _units(name)
         coords = {
             "contact": ("contact", np.array(names, dtype=object)),
@@ -252,8 +258,11 @@ def _read(data: Any, k: int, told: Any, names: tuple[str, ...], points: tuple[st
         raise ValueError("grazed is what shooting tells, defect harmonic balance")
     if np.isfinite(numbers["own_off"]) != (series and bool(told["multiplied"])):
         raise ValueError("harmonic balance tells how far the motion's own multiplier is off, where it has any")
+    time = data["time"].values[k]
+    count = int(np.searchsorted(time, time[-1])) + 1 if len(time) else 0
+    histories = {n: data[n].values[k][: count if "sample" in dims else None] for n, dims in HISTORIES.items()}
     return Cycle(
-        **numbers, time=data["time"].values[k], **{name: data[name].values[k] for name in HISTORIES},
+        **numbers, time=time[:count], **histories,
         multipliers=parts[:, 0] + 1j * parts[:, 1], changes=changes, contact_names=names, watch_names=points,
         landed=int(told["landed"]), reached_from=str(told["reached_from"]), method=_method(told),
         harmonics=int(told["harmonics"]), multiplied=bool(told["multiplied"]),
@@ -277,8 +286,9 @@ def _branch(told: Any, count: int, onsets: int) -> CycleBranch:
     return CycleBranch(numbers, *words, onset, folds, met, str(told.get("reached_from", "")))
 
 
-def _stacked(rows: list[Any], dims: int) -> Any:
-    return np.array(rows, dtype=float) if rows else np.zeros((0,) * dims)
+def _lasting(values: Array, count: int) -> Array:
+    """So many rows: the last one, at the end of the period, as often as others have more."""
+    return np.concatenate([values, np.repeat(values[-1:], count - len(values), axis=0)])
 
 
 def _units(name: str) -> dict[str, str]:

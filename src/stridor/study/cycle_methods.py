@@ -36,7 +36,7 @@ from .cycle_runs import PUSHES as RUN_PUSHES
 from .cycle_runs import Asked, SettledRun, alike, fastest
 from .workspace import Workspace
 
-PUSHES = (1.0, 3.0)  # of the slip speed
+PUSHES = (1.0, 3.0, -1.0)  # of the slip speed: along the slip, and against it, to where it rests
 HARMONICS = 7  # to begin with, where the defect is to decide
 MOST_HARMONICS = 48
 DEFECT = 1e-3  # beyond which there are more

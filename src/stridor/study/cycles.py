@@ -63,10 +63,11 @@ def cycles(
     sliding, through folds, and by shooting those of cycles that motions run into just below the lowest onset, at the
     upper end, and at ``mu``; then, where steady sliding is unstable and none of these has a stable cycle, those that
     runs in time lead to, at ``runs`` μ at most. push [m/s]: by how much the slip velocities are pushed off steady
-    sliding (default: one and three times the slip speed). points: most cycles of a branch, each way; seconds: of
-    processor time, by shooting for a motion that comes back to nowhere (default: 60), by harmonic balance for following
-    a branch (default: no limit) and a run (60). progress: called with the number of cycles so far and what is done;
-    keep: with what was found so far, behind each cycle. Ctrl-C ends the search and gives what was found.
+    sliding, along the slip where above 0 (default: one and three times the slip speed, and once against it, to where it
+    rests). points: most cycles of a branch, each way; seconds: of processor time, by shooting for a motion that comes
+    back to nowhere (default: 60), by harmonic balance for following a branch (default: no limit) and a run (60).
+    progress: called with the number of cycles so far and what is done; keep: with what was found so far, behind each
+    cycle. Ctrl-C ends the search and gives what was found.
 
     Cycles to which no motion and no branch leads are not found. Raises CaseError for what the method does not take and
     where nothing slides, AnalysisError where steady sliding does not exist.

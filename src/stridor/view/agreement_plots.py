@@ -12,6 +12,7 @@ from ..modal.complex_modes import ComplexModes
 from ..temporal.signals import Components, low_passed
 from .colours import BLUE, VERMILION
 from .style import extrema, legend_above, panel, styled, zero_line
+from .units import frequency_unit, frequency_words, time_unit
 
 RANGE_FACTOR = 1.35
 
@@ -31,11 +32,13 @@ def spectrum_map(
     lam = modes.eigenvalues[row]
     lam = lam[(lam.imag > 0) & (lam.imag <= 2 * np.pi * max_frequency_hz)]
     zero_line(ax)
+    unit, its_name = frequency_unit(max_frequency_hz)
     unstable = lam.real > 0
     for part, colour, name in ((~unstable, BLUE, "complex modes, stable"), (unstable, VERMILION, "unstable")):
-        ax.plot(lam[part].imag / 2e3 / np.pi, lam[part].real, "o", mfc="none", mec=colour, ms=9, mew=1.5, label=name)
+        frequency = lam[part].imag / (2 * np.pi * unit)
+        ax.plot(frequency, lam[part].real, "o", mfc="none", mec=colour, ms=9, mew=1.5, label=name)
     ax.plot(
-        found.eigenvalues.imag / 2e3 / np.pi,
+        found.eigenvalues.imag / (2 * np.pi * unit),
         found.eigenvalues.real,
         "x",
         color="black",
@@ -43,7 +46,7 @@ def spectrum_map(
         mew=1.4,
         label="identified in the time signal",
     )
-    ax.set(xlabel="frequency [kHz]", ylabel="growth rate Re λ [1/s]", xlim=(0, max_frequency_hz / 1e3))
+    ax.set(xlabel=f"frequency [{its_name}]", ylabel="growth rate Re λ [1/s]", xlim=(0, max_frequency_hz / unit))
     reach = float(np.abs(lam.real).max(initial=0.0)) * RANGE_FACTOR
     if reach > 0:
         ax.set_ylim(-reach, reach)
@@ -66,7 +69,8 @@ def perturbation_growth(
     figure, ax = panel(ax, 3.5)
     signal, sampling = perturbation.signal, perturbation.sampling
     band = signal if max_frequency_hz is None else low_passed(signal, sampling, max_frequency_hz)
-    ax.set(xlabel="time [ms]", ylabel="|slip speed − steady| [m/s]")
+    unit, its_name = time_unit(len(signal) * sampling)
+    ax.set(xlabel=f"time [{its_name}]", ylabel="|slip speed − steady| [m/s]")
     if not len(band) or not np.any(band):
         return figure
     start = (len(signal) - len(band)) // 2
@@ -74,10 +78,10 @@ def perturbation_growth(
     if len(band) < len(signal):
         every = np.arange(len(signal)) * sampling
         ax.semilogy(
-            1e3 * every, np.maximum(np.abs(signal), 1e-300), color="#BBBBBB", linewidth=0.6, label="all frequencies"
+            every / unit, np.maximum(np.abs(signal), 1e-300), color="#BBBBBB", linewidth=0.6, label="all frequencies"
         )
-    name = "the perturbation" if max_frequency_hz is None else f"up to {max_frequency_hz / 1e3:g} kHz"
-    ax.semilogy(1e3 * time, np.maximum(np.abs(band), 1e-300), color=BLUE, linewidth=0.7, label=name)
+    name = "the perturbation" if max_frequency_hz is None else f"up to {frequency_words(max_frequency_hz)}"
+    ax.semilogy(time / unit, np.maximum(np.abs(band), 1e-300), color=BLUE, linewidth=0.7, label=name)
     if modal_growth_rate is not None:
         # The line goes through the peaks: the largest value of each period of what grows, its middle one.
         pieces = max(2, min(int((time[-1] - time[0]) * perturbation.frequency_hz), len(band) // 4))
@@ -87,7 +91,7 @@ def perturbation_growth(
         level = np.median((np.log(peaks) - modal_growth_rate * at)[late])
         ends = time[[0, -1]]
         ax.semilogy(
-            1e3 * ends,
+            ends / unit,
             np.exp(level + modal_growth_rate * ends),
             "--",
             color=VERMILION,
@@ -96,7 +100,7 @@ def perturbation_growth(
         )
     size = float(np.abs(band).max())
     ax.set_ylim(size / 1e3, 10 * size)
-    ax.set_xlim(0, 1e3 * len(signal) * sampling)
+    ax.set_xlim(0, len(signal) * sampling / unit)
     legend_above(ax)
     return figure
 

@@ -24,6 +24,7 @@ from ..case.bodies import (
 )
 from ..case.schema import Contact
 from .tables import Table, TableRow, significant
+from .units import length_unit, modulus_unit
 
 
 def body_words(case: Case, name: str, body: AnyBody) -> str:
@@ -40,16 +41,19 @@ def body_words(case: Case, name: str, body: AnyBody) -> str:
         files = ", ".join(dict.fromkeys(Path(term.file).name for term in body.terms))
         return f"{name}: matrices of another program ({files}){_sliding_words(body.sliding)}."
     x, y = body.direction
+    unit, its_name = length_unit(body.length_m)
+    sizes = " × ".join(f"{size / unit:g}" for size in (body.length_m, body.width, body.thickness))
     return (
-        f"{name}: a beam of {_material_words(case, body.material)}, {1e3 * body.length_m:g} × {1e3 * body.width:g} × "
-        f"{1e3 * body.thickness:g} mm, from ({1e3 * body.start[0]:g}, {1e3 * body.start[1]:g}) mm at "
+        f"{name}: a beam of {_material_words(case, body.material)}, {sizes} {its_name}, from "
+        f"({body.start[0] / unit:g}, {body.start[1] / unit:g}) {its_name} at "
         f"{np.degrees(np.arctan2(y, x)):.4g}° to the x axis; {body.elements} elements, {body.mass} mass."
     )
 
 
 def _material_words(case: Case, name: str) -> str:
     material = case.materials[name]
-    return f"{material.young_modulus / 1e9:g} GPa and {material.density:g} kg/m³"
+    unit, its_name = modulus_unit(material.young_modulus)
+    return f"{material.young_modulus / unit:g} {its_name} and {material.density:g} kg/m³"
 
 
 def _sliding_words(sliding: SlidingTable | None) -> str:

@@ -16,6 +16,7 @@ from ..study.ensemble_result import AXES, Ensemble
 from ..typing import Array, IntArray
 from .colours import COLOURS, INK
 from .style import new_figure, root_figure, styled
+from .units import Unit, frequency_unit, most, time_unit
 
 NAMES = {"mu": "friction coefficient μ", "load": "factor of loads", "speed": "factor of speeds",
          "perturbation": "perturbation [m/s]"}  # fmt: skip
@@ -70,8 +71,9 @@ def ensemble_map(result: Ensemble) -> Figure:
     rows = 2 * len(pages) + modal
     figure = new_figure(0.5 + 2.3 * rows)
     panels = figure.subplots(rows, 2, squeeze=False)
+    unit, its_name = _frequencies(result)
     tables = (
-        (result.rms, f"rms [{result.unit}]"), (result.frequency_hz / 1e3, "dominant frequency [kHz]"),
+        (result.rms, f"rms [{result.unit}]"), (result.frequency_hz / unit, f"dominant frequency [{its_name}]"),
         (result.stick.max(axis=1, initial=0.0), "share of time in stick"),
         (result.separation.max(axis=1, initial=0.0), "share of time in separation"),
     )  # fmt: skip
@@ -104,7 +106,15 @@ def _headed(figure: Figure, shown: _Shown, marks: Sequence[str]) -> None:
 
 
 def _window(result: Ensemble) -> str:
-    return f"{1e3 * result.window[0]:.4g} … {1e3 * result.window[1]:.4g} ms"
+    start, end = result.window
+    unit, its_name = time_unit(end - start, end)
+    return f"{start / unit:.4g} … {end / unit:.4g} {its_name}"
+
+
+def _frequencies(result: Ensemble) -> Unit:
+    """One unit [Hz] of all frequencies of an ensemble."""
+    modal = 0.0 if result.modal is None else most(result.modal.frequency_hz)
+    return frequency_unit(max(most(result.frequency_hz), modal))
 
 
 def _map(figure: Figure, ax: Axes, shown: _Shown, branch: int, table: Array, *, share: bool) -> None:
@@ -190,7 +200,7 @@ def _numbers(ax: Axes, shown: _Shown, page: int) -> str:
         for where in np.ndindex(shown.members[branch].shape):
             k = int(shown.members[branch][where])
             if modes[k]:
-                at = _at(shown, where, shown.result.frequency_hz[k] / 1e3)
+                at = _at(shown, where, shown.result.frequency_hz[k] / _frequencies(shown.result)[0])
                 # Over one number away from the other branch.
                 others = shown.of(shown.result.frequency_hz)[:, where[0]] if not two else []
                 below = not two and bool(shown.result.frequency_hz[k] < np.nanmax(others))
@@ -206,17 +216,18 @@ def _modal(left: Axes, right: Axes, result: Ensemble) -> None:
     """What the modal approach says over μ."""
     modal = result.modal
     assert modal is not None
+    unit, its_name = _frequencies(result)
     for j, speed in enumerate(modal.speed):
         label = f"speed {speed:g}" if len(modal.speed) > 1 else None
         colour = COLOURS[j % len(COLOURS)]
         known = np.where(modal.unstable[:, j] >= 0, modal.unstable[:, j], np.nan)
         left.plot(modal.mu, known, "o-", color=colour, ms=4, label=label, drawstyle="steps-mid")
-        right.plot(modal.mu, modal.frequency_hz[:, j] / 1e3, "o", color=colour, ms=4, label=label)
+        right.plot(modal.mu, modal.frequency_hz[:, j] / unit, "o", color=colour, ms=4, label=label)
     left.set_title("modes that grow")
     left.set_xlabel(NAMES["mu"])
     left.set_ylim(bottom=-0.1)
     left.yaxis.set_major_locator(MaxNLocator(integer=True))
-    right.set_title("frequency of the fastest of them [kHz]")
+    right.set_title(f"frequency of the fastest of them [{its_name}]")
     right.set_xlabel(NAMES["mu"])
     right.set(xlim=left.get_xlim(), ylim=(0.0, right.get_ylim()[1]))
     if len(modal.speed) > 1:

@@ -23,6 +23,7 @@ from .colours import BLUE, GREY, INK, VERMILION
 from .interface_columns import NodeColumns, arc_length, columns_along, seen_from_normal
 from .sliding_marks import mark_on_line, mark_on_patch
 from .style import WIDTH, largest, legend_above, panel, styled, zero_line
+from .units import Unit, extent, gap_unit, length_unit, most, pressure_unit, time_unit
 
 Quantity = Literal["pressure", "status", "slip", "gap"]
 QUANTITIES = ("pressure", "status", "slip", "gap")
@@ -46,9 +47,10 @@ def contact_map(
     """Space–time picture of a contact: position along the interface across, time from ``start`` to ``end`` [s] upwards.
 
     ``contact``: its name, otherwise the first. ``quantity``: "pressure" [MPa] (normal force [N] for point contacts),
-    "status", "slip" (velocity along the first tangent [m/s], signed) or "gap" [µm]. In space the nodes fall in columns
-    by their position: along the direction of sliding, unless ``along`` gives another direction or ``about`` a point to
-    take the angle about; a column shows its mean pressure, mean slip, mean gap and most frequent status.
+    "status", "slip" (velocity along the first tangent [m/s], signed) or "gap" [µm]; much smaller pressures are in Pa,
+    larger gaps in mm or m. In space the nodes fall in columns by their position: along the direction of sliding, unless
+    ``along`` gives another direction or ``about`` a point to take the angle about; a column shows its mean pressure,
+    mean slip, mean gap and most frequent status.
 
     Where there are more than 1500 records a row stands for several: mean pressure and slip, largest gap, and of the
     statuses the one that is rarest in the picture, so that no short event is hidden.
@@ -66,13 +68,15 @@ def contact_map(
     )
     time, values = map_values(history, nodes, records, columns, quantity)
     figure, ax = panel(ax, 4.2)
-    sides = _time_edges(1e3 * time, 1e3 * history.time[records][[0, -1]])
+    first, last = (float(t) for t in history.time[records][[0, -1]])
+    unit, its_name = time_unit(last - first, last)
+    sides = _time_edges(time / unit, np.array([first, last]) / unit)
     if quantity == "status":
         _status_map(ax, columns, sides, values)
     else:
         area = bool(np.all(np.isfinite(history.area[nodes])))
         _value_map(figure, ax, columns, sides, values, quantity, area=area)
-    ax.set(xlabel=columns.label, ylabel="time [ms]")
+    ax.set(xlabel=columns.label, ylabel=f"time [{its_name}]")
     _headed(ax, f"contact {name}: {quantity}", above_legend=quantity == "status")
     ax.grid(False)
     return figure
@@ -99,21 +103,26 @@ def contact_snapshot(
     position, tangents, slip = history.position[nodes], history.tangents[nodes], history.slip_velocity[record, nodes]
     figure, ax = panel(ax, _height(position, tangents, 4.0))
     if position.shape[1] == 2:
-        _along_line(ax, 1e3 * arc_length(position, tangents), values[0], status)
-        ax.set(xlabel="position along the contact [mm]", ylabel=label)
+        (x,), (length, its_name) = _lengths(arc_length(position, tangents))
+        _along_line(ax, x, values[0], status)
+        ax.set(xlabel=f"position along the contact [{its_name}]", ylabel=label)
         zero_line(ax)
         mark_on_line(ax, tangents, slip)
     else:
-        x, y = (1e3 * c for c in seen_from_normal(position, tangents))
+        (x, y), (length, its_name) = _lengths(*seen_from_normal(position, tangents))
         shown = _patch(ax, x, y, values[0])
         figure.colorbar(shown, ax=ax, pad=0.02, shrink=0.85, label=label)
         _status_markers(ax, x, y, status)
-        ax.set(xlabel="along the first tangent [mm]", ylabel="along the second tangent [mm]")
+        ax.set(xlabel=f"along the first tangent [{its_name}]", ylabel=f"along the second tangent [{its_name}]")
         ax.set_aspect("equal", adjustable="datalim")  # a box of its own is not laid out with its title
         ax.grid(False)
-        mark_on_patch(ax, position, tangents, slip)
+        mark_on_patch(ax, position, tangents, slip, length)
     legend_above(ax)
-    _headed(ax, title or f"contact {name} at {1e3 * float(history.time[record]):.6g} ms")
+    if title is None:
+        now = float(history.time[record])
+        second, of_time = time_unit(now)
+        title = f"contact {name} at {now / second:.6g} {of_time}"
+    _headed(ax, title)
     return figure
 
 
@@ -145,23 +154,26 @@ def interface_energy(
     figure, ax = panel(ax, _height(position, tangents, 3.6))
     colours = [VERMILION if e > 0 else BLUE for e in energy]
     if position.shape[1] == 2:
-        x = 1e3 * arc_length(position, tangents)
+        (x,), (length, its_name) = _lengths(arc_length(position, tangents))
         ax.vlines(x, 0.0, energy, colors=colours, linewidth=1.6, zorder=2)
         ax.scatter(x, energy, c=colours, s=16, zorder=3)
         zero_line(ax)
-        ax.set(xlabel="position along the contact [mm]", ylabel=label)
+        ax.set(xlabel=f"position along the contact [{its_name}]", ylabel=label)
     else:
-        x, y = (1e3 * c for c in seen_from_normal(position, tangents))
+        (x, y), (length, its_name) = _lengths(*seen_from_normal(position, tangents))
         size = largest(energy)
         area = 12.0 + 90.0 * np.abs(np.nan_to_num(energy)) / size
         dots = ax.scatter(x, y, c=energy, s=area, cmap="RdBu_r", vmin=-size, vmax=size, edgecolors=GREY, linewidths=0.4)
         figure.colorbar(dots, ax=ax, pad=0.02, shrink=0.85, label=label)
-        ax.set(xlabel="along the first tangent [mm]", ylabel="along the second tangent [mm]")
+        ax.set(xlabel=f"along the first tangent [{its_name}]", ylabel=f"along the second tangent [{its_name}]")
         ax.set_aspect("equal", adjustable="datalim")  # a box of its own is not laid out with its title
         ax.margins(0.08)
         ax.grid(False)
     if slip is not None and tangents is not None:
-        (mark_on_line(ax, tangents, slip) if position.shape[1] == 2 else mark_on_patch(ax, position, tangents, slip))
+        if position.shape[1] == 2:
+            mark_on_line(ax, tangents, slip)
+        else:
+            mark_on_patch(ax, position, tangents, slip, length)
     handles = [
         Line2D([], [], color=c, marker="o", ms=4.5, linestyle="none", label=text)
         for c, text in ((VERMILION, "feeds the motion"), (BLUE, "takes from it"))
@@ -193,6 +205,12 @@ def contact_energies(system: System, energy: Array) -> dict[str, Figure]:
             ax = figures[name].axes[0]
             ax.set_title(f"contact {name}: {ax.get_title(loc='left')}", loc="left", pad=22.0)
     return figures
+
+
+def _lengths(*coordinates: Array) -> tuple[list[Array], Unit]:
+    """Coordinates (m,) [m] in the unit that their range asks for, and that unit."""
+    unit = length_unit(extent(np.column_stack(coordinates)))
+    return [c / unit[0] for c in coordinates], unit
 
 
 def _height(position: Array, tangents: Array | None, line: float) -> float:
@@ -254,7 +272,7 @@ def map_values(
     else:
         field = history.gap if quantity == "gap" else history.slip_velocity[:, :, 0]
         members = np.bincount(columns.column, minlength=columns.count)
-        rows = _summed(field[records, nodes], columns) / members * (1e6 if quantity == "gap" else 1.0)
+        rows = _summed(field[records, nodes], columns) / members
     if quantity == "gap":
         return history.time[records][begin], np.maximum.reduceat(rows, begin, axis=0)
     total = np.add.reduceat(rows, begin, axis=0)
@@ -269,13 +287,13 @@ def _summed(values: Array, columns: NodeColumns) -> Array:
 
 
 def _pressure_columns(history: NodeHistory, nodes: IntArray, records: slice, columns: NodeColumns) -> Array:
-    """Force over area (r, columns) [MPa], which nodes without area cannot spoil; for point contacts force [N]."""
+    """Force over area (r, columns) [Pa], which nodes without area cannot spoil; for point contacts force [N]."""
     force = _summed(history.normal_force[records, nodes], columns)
     area = history.area[nodes]
     if not np.all(np.isfinite(area)):
         return force
     whole = np.bincount(columns.column, weights=area, minlength=columns.count)
-    return np.where(whole > 0, 1e-6 * force / np.where(whole > 0, whole, 1.0), np.nan)
+    return np.where(whole > 0, force / np.where(whole > 0, whole, 1.0), np.nan)
 
 
 def _status_rows(status: IntArray, columns: NodeColumns, begin: IntArray) -> Array:
@@ -289,11 +307,13 @@ def _status_rows(status: IntArray, columns: NodeColumns, begin: IntArray) -> Arr
 
 
 def _pressure_or_force(history: NodeHistory, nodes: IntArray, records: slice) -> tuple[Array, str]:
-    """Pressure (r, m) [MPa] of nodes, or normal force [N] where they have no area, with its label."""
+    """Pressure (r, m) of nodes in the unit that its size asks for, or normal force [N] without areas, and its label."""
     force, area = history.normal_force[records, nodes], history.area[nodes]
     if not np.all(np.isfinite(area)):
         return force, "normal force [N]"
-    return np.where(area > 0, 1e-6 * force / np.where(area > 0, area, 1.0), np.nan), "pressure [MPa]"
+    pressure = np.where(area > 0, force / np.where(area > 0, area, 1.0), np.nan)
+    unit, its_name = pressure_unit(most(pressure))
+    return pressure / unit, f"pressure [{its_name}]"
 
 
 def _time_edges(time: Array, span: Array) -> Array:
@@ -312,19 +332,25 @@ def _status_map(ax: Axes, columns: NodeColumns, sides: Array, values: Array) -> 
 def _value_map(
     figure: Figure, ax: Axes, columns: NodeColumns, sides: Array, values: Array, quantity: Quantity, *, area: bool
 ) -> None:
+    unit, its_name = 1.0, "N"
+    if quantity == "gap":
+        unit, its_name = gap_unit(most(values))
+    elif quantity == "slip":
+        its_name = "m/s"
+    elif area:
+        unit, its_name = pressure_unit(most(values))
+    values = values / unit
     known = values[~np.isnan(values)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
     if not np.isfinite(low):
         low, high = 0.0, 1.0
     look: dict[str, Any] = {"cmap": "cividis", "vmin": min(low, 0.0), "vmax": high if high > min(low, 0.0) else 1.0}
-    label = "pressure [MPa]" if area else "normal force [N]"
-    if quantity == "gap":
-        label = "gap [µm]"
-    elif quantity == "slip":
+    label = {"gap": "gap", "slip": "slip velocity"}.get(quantity, "pressure" if area else "normal force")
+    if quantity == "slip":
         size = largest(values)
-        label, look = "slip velocity [m/s]", {"cmap": "RdBu_r", "vmin": -size, "vmax": size}
+        look = {"cmap": "RdBu_r", "vmin": -size, "vmax": size}
     shown = ax.pcolormesh(columns.edges, sides, values, rasterized=True, **look)
-    figure.colorbar(shown, ax=ax, pad=0.01, label=label)
+    figure.colorbar(shown, ax=ax, pad=0.01, label=f"{label} [{its_name}]")
 
 
 def _along_line(ax: Axes, x: Array, values: Array, status: IntArray) -> None:

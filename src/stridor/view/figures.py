@@ -10,6 +10,7 @@ from ..modal.onsets import Onset
 from . import plots
 from .inputs import ReportInputs
 from .page_parts import ReportFigure
+from .units import frequency_words
 from .windows import Window, shown_motion
 
 
@@ -172,8 +173,9 @@ def temporal_figures(inputs: ReportInputs, window: Window | None) -> Iterator[Re
         yield ReportFigure(
             "acceleration",
             f"Acceleration of {point}",
-            f"Along {along}, over the whole run. The dark band is what lies below {inputs.max_frequency_hz / 1e3:g} "
-            "kHz, the light one everything the time step resolves, impacts included. Dotted lines: where phases begin.",
+            f"Along {along}, over the whole run. The dark band is what lies below "
+            f"{frequency_words(inputs.max_frequency_hz)}, the light one everything the time step resolves, impacts "
+            "included. Dotted lines: where phases begin.",
             f"Acceleration of {point} along {along} over time with the phases of the run marked.",
             plots.acceleration_history(run, point, direction=along, max_frequency_hz=inputs.max_frequency_hz),
         )
@@ -299,7 +301,7 @@ def agreement_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
                 "perturbation",
                 "Growth of a small perturbation",
                 f"Slip speed minus its steady value at μ = {chosen.mu:g}, up to where friction stays linear. The "
-                f"dashed line has the slope of the modal growth rate. Grey: what lies above {top / 1e3:g} kHz, "
+                f"dashed line has the slope of the modal growth rate. Grey: what lies above {frequency_words(top)}, "
                 "out of the range compared, may grow as well.",
                 "Size of the perturbation over time on a logarithmic scale beside the modal growth rate.",
                 plots.perturbation_growth(

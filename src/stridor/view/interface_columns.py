@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import CaseError
 from ..typing import Array, IntArray
+from .units import extent, length_unit
 
 ALIGNED = 0.6  # mean length of unit tangents above which they count as one direction
 
@@ -40,7 +41,7 @@ def columns_along(
     Raises CaseError for directions that are none.
     """
     if position.shape[1] == 2:
-        return _columns(1e3 * arc_length(position, tangents), "position along the contact [mm]", len(position))
+        return _lengths(arc_length(position, tangents), "position along the contact", len(position))
     first = None if tangents is None else tangents[:, 0]
     most = max(1, round(1.5 * np.sqrt(len(position))))
     if along is not None:
@@ -48,7 +49,7 @@ def columns_along(
         size = float(np.linalg.norm(direction)) if direction.shape == (3,) else 0.0
         if not size > 0 or not np.isfinite(size):
             raise CaseError("along", along, "a direction: three numbers, not all zero")
-        return _columns(1e3 * (position @ direction) / size, "position along the chosen direction [mm]", most)
+        return _lengths((position @ direction) / size, "position along the chosen direction", most)
     if about is not None:
         centre = np.asarray(about, dtype=float)
         if centre.shape != (3,):
@@ -58,12 +59,12 @@ def columns_along(
         mean = first.mean(axis=0)
         if np.linalg.norm(mean) > ALIGNED:
             unit = mean / np.linalg.norm(mean)
-            return _columns(1e3 * (position @ unit), "position along the direction of sliding [mm]", most)
+            return _lengths(position @ unit, "position along the direction of sliding", most)
         axis = _axis(position, first)
         centre = _centre(position, first, axis)
         return _columns(_angle(position, centre, axis), "angle about the axis of sliding [°]", most)
     from_middle, axes = _spread(position)
-    return _columns(1e3 * (from_middle @ axes[0]), "position along the contact [mm]", most)
+    return _lengths(from_middle @ axes[0], "position along the contact", most)
 
 
 def arc_length(position: Array, tangents: Array | None = None) -> Array:
@@ -96,6 +97,12 @@ def seen_from_normal(position: Array, tangents: Array | None) -> tuple[Array, Ar
     if tangents is not None and len(tangents) and float(np.sum(tangents[:, 1] @ second)) < 0:
         second = -second
     return from_middle @ first, from_middle @ second
+
+
+def _lengths(value: Array, label: str, most: int) -> NodeColumns:
+    """Columns of nodes by a length (m,) [m], in the unit that its range asks for."""
+    unit, its_name = length_unit(extent(value[:, None]))
+    return _columns(value / unit, f"{label} [{its_name}]", most)
 
 
 def _columns(value: Array, label: str, most: int) -> NodeColumns:

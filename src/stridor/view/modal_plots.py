@@ -17,7 +17,8 @@ from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onset, Onsets
 from ..typing import Array, BoolArray
 from .colours import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION
-from .style import frequency_unit, legend_above, panel, root_figure, styled, zero_line
+from .style import legend_above, panel, root_figure, styled, zero_line
+from .units import frequency_unit
 
 LINES = (BLUE, GREEN, PURPLE, SKY, ORANGE)  # vermilion is kept for what is unstable
 MU = "friction coefficient μ"
@@ -170,8 +171,9 @@ def friction_curve(
     figure, ax = panel(ax, 4.0)
     low, high = friction_range
     span = high - low
+    unit, its_name = frequency_unit(float(frequency_hz[-1]))
     for piece in _pieces(mu, low - 0.15 * span, high + 0.15 * span):
-        ax.plot(frequency_hz[piece] / 1e3, mu[piece], color=BLUE, linewidth=1.4)
+        ax.plot(frequency_hz[piece] / unit, mu[piece], color=BLUE, linewidth=1.4)
     if case_mu is not None:
         ax.axhline(case_mu, color=GREY, linestyle=":", linewidth=1.2)
         ax.annotate(
@@ -184,13 +186,13 @@ def friction_curve(
             color=GREY,
         )
     ax.set(
-        xlabel="frequency [kHz]",
+        xlabel=f"frequency [{its_name}]",
         ylabel=MU,
         ylim=(low - 0.02 * span, high + 0.06 * span),
-        xlim=(frequency_hz[0] / 1e3, frequency_hz[-1] / 1e3),
+        xlim=(frequency_hz[0] / unit, frequency_hz[-1] / unit),
     )
     named = onsets.onsets if onsets is not None else ()
-    _mark_onsets(ax, [(onset.frequency_hz / 1e3, onset.mu, onset) for onset in named if low <= onset.mu <= high])
+    _mark_onsets(ax, [(onset.frequency_hz / unit, onset.mu, onset) for onset in named if low <= onset.mu <= high])
     return figure
 
 

@@ -23,6 +23,7 @@ from .tables import (
     same_as_printed,
     significant,
 )
+from .units import frequency_words
 
 SAME_ONSET = 0.05  # relative distance of frequencies within which a printed onset is the computed one
 PRINTED = "Differences beyond 0.5 % are marked with ▲."
@@ -162,7 +163,7 @@ def _onsets(onsets: Onsets, name: str, printed: tuple[ReferenceOnset, ...]) -> T
     )
     low, high = onsets.friction_range
     caption = (
-        f"All onsets with {low:g} ≤ μ ≤ {high:g} and frequencies up to {onsets.max_frequency_hz / 1e3:g} kHz, "
+        f"All onsets with {low:g} ≤ μ ≤ {high:g} and frequencies up to {frequency_words(onsets.max_frequency_hz)}, "
         f"{'with structural damping' if onsets.damped else 'without damping'}. Modes are numbered by frequency "
         "at μ = 0."
     )
@@ -244,7 +245,7 @@ def modes_table(modes: ComplexModes, mu: float, max_frequency_hz: float, damping
         for b in order
     )
     heads = ("mode", "frequency [Hz]", "growth rate [1/s]", "damping ratio [%]", "", "residual")
-    caption = f"Up to {max_frequency_hz / 1e3:g} kHz, {damping}. Growth rate is Re λ: positive grows."
+    caption = f"Up to {frequency_words(max_frequency_hz)}, {damping}. Growth rate is Re λ: positive grows."
     if modes.completeness:
         caption += f" {modes.completeness[row]}"
     return Table("modes", f"Complex modes at μ = {modes.mu[row]:g}", heads, rows, frozenset({4}), caption)

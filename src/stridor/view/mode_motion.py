@@ -21,6 +21,7 @@ from .skin import (
     drawn_scale,
     facet_edges,
 )
+from .units import later_words
 
 QUANTA = 32767  # steps of a displacement in the page, from none to the largest amplitude
 
@@ -30,9 +31,8 @@ def growth_in_words(growth_rate: float) -> str:
     if growth_rate == 0:
         return "neither grows nor decays"
     time = np.log(10.0) / abs(growth_rate)
-    much = f"{1e3 * time:.3g} ms" if time < 1 else f"{time:.3g} s"
     kind, change = ("unstable", "ten times as large") if growth_rate > 0 else ("stable", "a tenth")
-    return f"{kind}: growth rate {growth_rate:+.4g} 1/s, {change} after {much}"
+    return f"{kind}: growth rate {growth_rate:+.4g} 1/s, {change} after {later_words(float(time), 3)}"
 
 
 def page_data(skin: Skin, *, scale: float | None) -> dict[str, Any]:

@@ -12,7 +12,8 @@ from ..modal.onsets import Onsets
 from ..modal.parametric import ModesAtPoints
 from .colours import BLUE, GREY, INK, VERMILION
 from .modal_plots import MU
-from .style import frequency_unit, legend_above, panel, stacked, styled, zero_line
+from .style import legend_above, panel, stacked, styled, zero_line
+from .units import frequency_unit, most
 
 MOST_NAMED = 12  # onsets with their value beside them
 
@@ -62,8 +63,9 @@ def modes_at_points(found: ModesAtPoints) -> Figure:
     figure, (upper, lower) = stacked(None, 2, 5.4)
     varied = max(range(len(found.parameters)), key=lambda k: len(np.unique(found.values[:, k])))
     x = np.broadcast_to(found.values[:, [varied]], found.frequency_hz.shape)
+    unit, its_name = frequency_unit(most(found.frequency_hz))
     for ax, values, words in (
-        (upper, found.frequency_hz / 1e3, "frequency [kHz]"), (lower, found.growth_rate, "growth rate [1/s]")
+        (upper, found.frequency_hz / unit, f"frequency [{its_name}]"), (lower, found.growth_rate, "growth rate [1/s]")
     ):  # fmt: skip
         for chosen, fill, colour, label in (
             (~found.unstable, "none", BLUE, "decays"), (found.unstable, VERMILION, VERMILION, "unstable")

@@ -15,6 +15,7 @@ from ..system import System
 from ..typing import Array, ComplexArray
 from .colours import COLOURS, GREEN, GREY, INK, PURPLE, VERMILION
 from .style import legend_above, new_figure, panel, root_figure, styled
+from .units import length_unit
 
 Shape = Mapping[str, ComplexArray]
 AMPLITUDE = 0.11  # of the model's extent: how far the largest motion is drawn
@@ -26,10 +27,11 @@ def model_plot(system: System, case: Case | None = None, *, ax: Axes | None = No
     """The model as it stands: bodies, contacts, and with the case its supports, loads and watched points."""
     figure, ax = panel(ax, 3.4)
     reach = _extent(system)
+    unit, its_name = length_unit(reach)
     for index, line in enumerate(system.lines):
         colour = COLOURS[index % len(COLOURS)]
-        ax.plot(*(1e3 * line.coordinates.T), color=colour, linewidth=3.5, solid_capstyle="butt", zorder=2)
-        middle = 1e3 * line.coordinates[len(line.coordinates) // 2]
+        ax.plot(*(line.coordinates.T / unit), color=colour, linewidth=3.5, solid_capstyle="butt", zorder=2)
+        middle = line.coordinates[len(line.coordinates) // 2] / unit
         # Beside the line, not on it: across its direction.
         across = _across(line.coordinates)
         ax.annotate(
@@ -43,9 +45,9 @@ def model_plot(system: System, case: Case | None = None, *, ax: Axes | None = No
             fontweight="bold",
         )
     if case is not None:
-        _draw_case(ax, case, 1e3 * reach)
-    _mark_contacts(ax, system, named=True)
-    _lengths(ax)
+        _draw_case(ax, case, reach, unit)
+    _mark_contacts(ax, system, unit, named=True)
+    _lengths(ax, its_name)
     ax.margins(0.2, 0.12)
     return figure
 
@@ -110,11 +112,12 @@ def at_best_phase(shape: Shape) -> dict[str, ComplexArray]:
 
 
 def _draw_shape(ax: Axes, system: System, motion: Mapping[str, ComplexArray], *, arrows: bool) -> None:
-    scale = 1e3 * AMPLITUDE * _extent(system)
+    unit, its_name = length_unit(_extent(system))
+    scale = AMPLITUDE * _extent(system) / unit
     for index, line in enumerate(system.lines):
         if line.name not in motion:
             continue
-        rest = 1e3 * line.coordinates
+        rest = line.coordinates / unit
         moved, later = rest + scale * motion[line.name].real, rest - scale * motion[line.name].imag
         colour = COLOURS[index % len(COLOURS)]
         ax.plot(*rest.T, color=GREY, linestyle=":", linewidth=1.2, zorder=2)
@@ -133,16 +136,17 @@ def _draw_shape(ax: Axes, system: System, motion: Mapping[str, ComplexArray], *,
                 alpha=0.75,
                 zorder=2.5,
             )
-    _mark_contacts(ax, system, named=False)
-    _lengths(ax)
+    _mark_contacts(ax, system, unit, named=False)
+    _lengths(ax, its_name)
     ax.plot([], [], color=GREY, linewidth=0.9, label="a quarter of a period later")
     ax.plot([], [], color=GREY, linestyle=":", linewidth=1.2, label="at rest")
     ax.margins(0.06, 0.1)
 
 
-def _draw_case(ax: Axes, case: Case, reach: float) -> None:
+def _draw_case(ax: Axes, case: Case, extent: float, unit: float) -> None:
+    reach = extent / unit
     for support in case.supports.values():
-        at = _position(case, support.at)
+        at = _position(case, support.at, unit)
         if at is None:
             continue
         ax.plot(*at, "s", mfc="white", mec=INK, ms=8, mew=1.4, zorder=4)
@@ -162,12 +166,12 @@ def _draw_case(ax: Axes, case: Case, reach: float) -> None:
             side = beside if beside[1] >= 0 else -beside
             _arrow(ax, at + side, speed, 0.16 * reach, GREEN, f"{np.hypot(*speed):g} m/s", at_head=False)
     for load in case.loads.values():
-        at = None if load.at is None else _position(case, load.at)
+        at = None if load.at is None else _position(case, load.at, unit)
         if any(load.force) and at is not None:
             size = f"{np.linalg.norm(load.force):g} N"
             _arrow(ax, at, np.array(load.force), 0.16 * reach, VERMILION, size, at_head=True)
     for watched in case.temporal.watch:
-        at = _position(case, watched)
+        at = _position(case, watched, unit)
         if at is None:
             continue
         ax.plot(*at, "o", mfc="white", mec=PURPLE, ms=4.5, mew=1.2, zorder=5)
@@ -197,19 +201,19 @@ def _arrow(ax: Axes, at: Array, along: Array, length: float, colour: str, text: 
     ax.plot(end[0], end[1], alpha=0)  # counts for the limits of the axes
 
 
-def _position(case: Case, reference: str) -> Array | None:
-    """Coordinates (2,) [mm] of a point; None for a boundary, which is not one place."""
+def _position(case: Case, reference: str, unit: float) -> Array | None:
+    """Coordinates (2,) in a unit [m] of a point; None for a boundary, which is not one place."""
     point = case.location(reference)
     if not isinstance(point, PointRef):
         return None
     body = case.bodies[point.body]
     coordinates = body.coordinates(point.distance) if isinstance(body, BeamBody) else point.coordinates
-    return None if coordinates is None else 1e3 * np.array(coordinates)
+    return None if coordinates is None else np.array(coordinates) / unit
 
 
-def _mark_contacts(ax: Axes, system: System, *, named: bool) -> None:
+def _mark_contacts(ax: Axes, system: System, unit: float, *, named: bool) -> None:
     for contact in system.contacts:
-        at = 1e3 * contact.slave_position
+        at = contact.slave_position / unit
         ax.plot(*at, "o", mfc="none", mec=INK, ms=10, mew=1.2, zorder=4)
         if named:
             below = -13 * np.sign(contact.normal)
@@ -239,7 +243,7 @@ def _extent(system: System) -> float:
     return float(np.ptp(everything, axis=0).max()) or 1.0
 
 
-def _lengths(ax: Axes) -> None:
+def _lengths(ax: Axes, unit: str) -> None:
     ax.set_aspect("equal", adjustable="box")
-    ax.set(xlabel="x [mm]", ylabel="y [mm]")
+    ax.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
     ax.grid(False)

@@ -11,6 +11,7 @@ from ..errors import CaseError
 from ..system import System
 from ..typing import Array, ComplexArray, IntArray
 from .colours import COLOURS
+from .units import frequency_unit
 
 AMPLITUDE = 0.08  # of the model's extent: how far the largest motion is drawn
 VIEW = (28.0, -58.0)  # elevation and azimuth [degrees]
@@ -228,7 +229,8 @@ def mode_title(frequency_hz: float | None, growth_rate: float | None) -> str:
     """A mode in words: its frequency and whether it grows."""
     words: list[str] = []
     if frequency_hz is not None:
-        words.append(f"{frequency_hz / 1e3:.4g} kHz" if abs(frequency_hz) >= 1e3 else f"{frequency_hz:.4g} Hz")
+        unit, its_name = frequency_unit(abs(frequency_hz) or 1.0)
+        words.append(f"{frequency_hz / unit:.4g} {its_name}")
     if growth_rate is not None:
         kind = "unstable: grows" if growth_rate > 0 else "stable: decays" if growth_rate < 0 else "neutral"
         words.append(f"growth rate {growth_rate:+.4g} 1/s ({kind})")

@@ -13,13 +13,13 @@ from .interface_columns import seen_from_normal
 ROOM = 0.09  # of the height, for the names of the edges
 
 
-def mark_on_patch(ax: Axes, position: Array, tangents: Array, slip: Array) -> None:
-    """Mark both edges of a contact in space, as `seen_from_normal` shows it in mm, with an arrow for the material of
-    the master that comes in. slip (m, 2): of the slave against the master along the tangents (m, 2, 3)."""
+def mark_on_patch(ax: Axes, position: Array, tangents: Array, slip: Array, unit: float) -> None:
+    """Mark both edges of a contact in space, as `seen_from_normal` shows it in a ``unit`` [m], with an arrow for the
+    material of the master that comes in. slip (m, 2): of the slave against the master along the tangents (m, 2, 3)."""
     direction = mean_direction(np.einsum("mq,mqd->md", slip, tangents))
     if direction is None:
         return
-    points = 1e3 * np.column_stack(seen_from_normal(position, tangents))
+    points = np.column_stack(seen_from_normal(position, tangents)) / unit
     # The same plane, one step further along the slip.
     moved = np.vstack([position, position + 1e-3 * direction])
     ahead = np.column_stack(seen_from_normal(moved, np.vstack([tangents, tangents])))

@@ -37,6 +37,7 @@ from .skin import (
     skin_of,
 )
 from .style import WIDTH, legend_above, new_figure, root_figure, styled
+from .units import Unit, extent, length_unit
 
 AMPLITUDES = "viridis"
 PIXELS = 1100  # of a solid in space, along the longer side
@@ -52,18 +53,19 @@ def mesh(system: System, *, ax: Axes | None = None, view: tuple[float, float] = 
     skin = skin_of(system)
     camera = _camera(skin, view)
     shown = _shown(skin.points, camera)
+    unit = length_unit(extent(skin.points))
     figure, ax = _axes(ax, shown)
     shades = np.array([to_rgb(body_colour(k)) for k in range(len(skin.names))])
     pale = 0.65 * shades + 0.35
     nodes = system.contact_nodes()
     if camera is None:
-        _cells(ax, skin, pale[skin.body])
+        _cells(ax, skin, pale[skin.body], unit[0])
     else:
-        _picture(ax, skin, shown, np.repeat(pale[skin.body][:, None], 4, axis=1), shown)
-    _lines(ax, skin, shown, shades[skin.segment_body])
-    at = 1e3 * _shown(nodes.position, camera)
+        _picture(ax, skin, shown, np.repeat(pale[skin.body][:, None], 4, axis=1), shown, unit[0])
+    _lines(ax, skin, shown, shades[skin.segment_body], unit[0])
+    at = _shown(nodes.position, camera) / unit[0]
     ax.scatter(at[:, 0], at[:, 1], s=14.0 if nodes.count < 100 else 5.0, color=INK, linewidths=0, zorder=5)
-    _lengths(ax, camera)
+    _lengths(ax, camera, unit)
     _legend(ax, skin, contact_nodes=nodes.count)
     return figure
 
@@ -110,22 +112,23 @@ def draw_frame(
     deformed, size = deformed_at(skin, scale=scale, phase=phase)
     rest, moved = _shown(skin.points, camera), _shown(deformed, camera)
     reach = np.concatenate([_shown(points, camera) for points in _swept(skin, scale)])
+    unit = length_unit(extent(skin.points))
     figure, ax = _axes(ax, reach)
     colours = colormaps[AMPLITUDES]
     # Of one moving corner the rest would be one dark colour: roots show small amplitudes, too.
     bent = concentrated(skin)
     size = np.sqrt(size) if bent else size
     if camera is None:
-        _smooth(ax, skin, deformed, size)
+        _smooth(ax, skin, deformed, size, unit[0])
         outline = np.concatenate([skin.edges, skin.segments])
     else:
-        _picture(ax, skin, moved, colours(size)[:, :3], reach, pixels)
+        _picture(ax, skin, moved, colours(size)[:, :3], reach, unit[0], pixels)
         outline = np.concatenate([sharp_edges(skin.points, skin.facets), skin.segments])
-    _lines(ax, skin, moved, colours(size[skin.segments].mean(axis=1))[:, :3])
-    pieces = list(1e3 * rest[outline, :2])
+    _lines(ax, skin, moved, colours(size[skin.segments].mean(axis=1))[:, :3], unit[0])
+    pieces = list(rest[outline, :2] / unit[0])
     ax.add_collection(LineCollection(pieces, colors=GREY, linewidths=0.8, linestyles=":", alpha=0.8, zorder=2.5))
-    ax.update_datalim(1e3 * reach[:, :2])
-    _lengths(ax, camera)
+    ax.update_datalim(reach[:, :2] / unit[0])
+    _lengths(ax, camera, unit)
     ax.plot([], [], color=GREY, linestyle=":", linewidth=1.2, label="at rest")
     legend_above(ax)
     shown = ScalarMappable(PowerNorm(0.5, 0.0, 1.0) if bent else Normalize(0.0, 1.0), colours)
@@ -176,7 +179,9 @@ def _axes(ax: Axes | None, shown: Array) -> tuple[Figure, Axes]:
     return figure, ax
 
 
-def _picture(ax: Axes, skin: Skin, seen: Array, colours: Array, reach: Array, pixels: int = PIXELS) -> None:
+def _picture(
+    ax: Axes, skin: Skin, seen: Array, colours: Array, reach: Array, unit: float, pixels: int = PIXELS
+) -> None:
     """The facets as they hide each other, as an image between the extremes of ``reach``."""
     low, high = reach[:, :2].min(axis=0), reach[:, :2].max(axis=0)
     room = 0.01 * float((high - low).max())
@@ -186,15 +191,15 @@ def _picture(ax: Axes, skin: Skin, seen: Array, colours: Array, reach: Array, pi
     # Whole pixels: the image may reach a little further than asked for.
     pixel = float((high - low).max()) / max(image.shape[:2])
     right, top = low + pixel * np.array(image.shape[1::-1])
-    extent = (1e3 * low[0], 1e3 * right, 1e3 * low[1], 1e3 * top)
-    ax.imshow(image, extent=extent, origin="upper", interpolation="antialiased", zorder=2)
+    sides = (low[0] / unit, right / unit, low[1] / unit, top / unit)
+    ax.imshow(image, extent=sides, origin="upper", interpolation="antialiased", zorder=2)
 
 
-def _cells(ax: Axes, skin: Skin, colours: Array) -> None:
+def _cells(ax: Axes, skin: Skin, colours: Array, unit: float) -> None:
     few = len(skin.facets) <= EDGES_UP_TO
     edge = 0.75 * colours if few else colours
     cells = PolyCollection(
-        list(1e3 * skin.points[skin.facets]),
+        list(skin.points[skin.facets] / unit),
         facecolors=list(colours),
         edgecolors=list(edge),
         linewidths=0.4 if few else 0.1,
@@ -204,36 +209,36 @@ def _cells(ax: Axes, skin: Skin, colours: Array) -> None:
     ax.add_collection(cells)
 
 
-def _smooth(ax: Axes, skin: Skin, points: Array, values: Array) -> None:
+def _smooth(ax: Axes, skin: Skin, points: Array, values: Array, unit: float) -> None:
     """Values at the nodes as smooth colours on the cells, with the mesh over them where it is coarse enough."""
     if not len(skin.facets):
         return
     halves = np.concatenate([skin.facets[:, [0, 1, 2]], skin.facets[:, [0, 2, 3]]])
     halves = halves[halves[:, 1] != halves[:, 2]]
-    x, y = 1e3 * points.T
+    x, y = points.T / unit
     triangles = Triangulation(x, y, halves)
     colours: Any = {"cmap": AMPLITUDES, "vmin": 0.0, "vmax": 1.0}
     ax.tripcolor(triangles, values, shading="gouraud", rasterized=True, zorder=2, **colours)
     if len(skin.facets) <= EDGES_UP_TO:
-        edges = list(1e3 * points[distinct(facet_edges(skin.facets))[0]])
+        edges = list(points[distinct(facet_edges(skin.facets))[0]] / unit)
         ax.add_collection(LineCollection(edges, colors="white", linewidths=0.35, alpha=0.45, zorder=2.2))
-    ax.add_collection(LineCollection(list(1e3 * points[skin.edges]), colors=INK, linewidths=0.8, zorder=2.3))
+    ax.add_collection(LineCollection(list(points[skin.edges] / unit), colors=INK, linewidths=0.8, zorder=2.3))
 
 
-def _lines(ax: Axes, skin: Skin, shown: Array, colours: Array) -> None:
+def _lines(ax: Axes, skin: Skin, shown: Array, colours: Array, unit: float) -> None:
     if len(skin.segments):
-        pieces = list(1e3 * shown[skin.segments, :2])
+        pieces = list(shown[skin.segments, :2] / unit)
         ax.add_collection(LineCollection(pieces, colors=list(colours), linewidths=3.2, capstyle="round", zorder=3))
 
 
-def _lengths(ax: Axes, camera: Camera | None) -> None:
-    """Equal lengths; in the plane axes in mm, in space a bar of a round length and where x, y and z point."""
+def _lengths(ax: Axes, camera: Camera | None, unit: Unit) -> None:
+    """Equal lengths; in the plane axes in a unit, in space a bar of a round length and where x, y and z point."""
     ax.set_aspect("equal", adjustable="box")
     ax.margins(0.05)
     ax.autoscale_view()
     ax.grid(False)
     if camera is None:
-        ax.set(xlabel="x [mm]", ylabel="y [mm]")
+        ax.set(xlabel=f"x [{unit[1]}]", ylabel=f"y [{unit[1]}]")
         return
     ax.set_axis_off()
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
@@ -241,8 +246,8 @@ def _lengths(ax: Axes, camera: Camera | None) -> None:
     base = bottom - 0.04 * (top - bottom)
     ax.plot([right - length, right], [base, base], color=INK, linewidth=2.0, solid_capstyle="butt")
     ax.annotate(
-        f"{length:g} mm", (right - length / 2, base), xytext=(0, -4), textcoords="offset points", ha="center", va="top",
-        fontsize=8.5,
+        f"{length:g} {unit[1]}", (right - length / 2, base), xytext=(0, -4), textcoords="offset points", ha="center",
+        va="top", fontsize=8.5,
     )  # fmt: skip
     arm = 0.07 * max(right - left, top - bottom)
     origin = np.array([left + 1.6 * arm, base])

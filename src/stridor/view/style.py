@@ -198,17 +198,3 @@ def largest(values: Array) -> float:
     finite = np.abs(values[np.isfinite(values)])
     size = float(finite.max(initial=0.0))
     return size if size > 0 else 1.0
-
-
-def frequency_unit(top: float) -> tuple[float, str]:
-    """The unit [Hz] of an axis of frequencies up to ``top`` [Hz], and its name: no thousands of them where there are
-    none, as in models of masses and springs of one, whose numbers may have no unit at all."""
-    return (1e3, "kHz") if top >= 1e3 else (1.0, "Hz")
-
-
-def energy_unit(joules: float) -> tuple[float, str]:
-    """The unit [J] in which an energy is a number from 1 to 1000, and its name; mJ of nothing."""
-    for unit, name in ((1e6, "MJ"), (1e3, "kJ"), (1.0, "J"), (1e-3, "mJ"), (1e-6, "µJ")):
-        if joules >= unit:
-            return unit, name
-    return (1e-9, "nJ") if joules > 0 else (1e-3, "mJ")

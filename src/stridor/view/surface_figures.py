@@ -15,6 +15,7 @@ from .field_plots import contact_energies
 from .inputs import ReportInputs
 from .page_parts import ReportFigure
 from .tables import Table, TableRow, drop_empty, number, significant
+from .units import most, pressure_unit
 
 
 def shape_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
@@ -91,6 +92,7 @@ def surface_table(inputs: ReportInputs) -> Table | None:
     steady = inputs.steady
     if steady is None or not steady.resultants:
         return None
+    unit, its_name = pressure_unit(most(np.array([found.largest_pressure for found in steady.resultants.values()])))
     rows = [
         TableRow(
             (
@@ -98,7 +100,7 @@ def surface_table(inputs: ReportInputs) -> Table | None:
                 ", ".join(significant(float(f)) for f in found.force),
                 ", ".join(significant(float(m)) for m in np.atleast_1d(found.moment)),
                 "" if not np.isfinite(found.area) else significant(found.area),
-                "" if not np.isfinite(found.largest_pressure) else number(found.largest_pressure / 1e6, 3),
+                "" if not np.isfinite(found.largest_pressure) else number(found.largest_pressure / unit, 3),
             )
         )
         for name, found in steady.resultants.items()
@@ -108,7 +110,7 @@ def surface_table(inputs: ReportInputs) -> Table | None:
         "force on the slave [N]",
         "moment about the origin [N m]",
         "area [m²]",
-        "largest pressure [MPa]",
+        f"largest pressure [{its_name}]",
     )
     caption = f"The equilibrium of every freedom is solved to {steady.residual:.1e} of the largest force."
     return drop_empty(Table("steady-surfaces", "Steady sliding", heads, tuple(rows), frozenset({0, 1, 2}), caption))

@@ -19,7 +19,6 @@ from ..typing import Array
 from .colours import BLUE, COLOURS, GREEN, GREY, INK, ORANGE, PURPLE, SKY, STATUS_COLOURS, VERMILION
 from .style import (
     draw_history,
-    energy_unit,
     extrema,
     legend_above,
     new_figure,
@@ -30,6 +29,7 @@ from .style import (
     thinned,
     zero_line,
 )
+from .units import energy_unit, frequency_unit, frequency_words, time_unit
 from .windows import Window, status_spans
 
 DIRECTIONS = {"x": 0, "y": 1, "z": 2}
@@ -62,7 +62,7 @@ def acceleration_history(
         draw_history(ax, time, values, colour=SKY, width=0.5, label="all frequencies")
         cut = (len(values) - len(band)) // 2
         assert max_frequency_hz is not None, "nothing is cut off without a limit"
-        name = f"up to {max_frequency_hz / 1e3:g} kHz"
+        name = f"up to {frequency_words(max_frequency_hz)}"
         draw_history(ax, time[cut : cut + len(band)], band, width=0.6, label=name)
         ax.legend(loc="upper left")
     else:
@@ -97,6 +97,7 @@ def spectrum_plot(
     else:
         figure, axes = root_figure(ax), [ax] * len(spectra)
     top = -np.inf
+    scale, its_name = frequency_unit(max_frequency_hz)
     for index, (name, spec) in enumerate(spectra.items()):
         inside = (spec.frequency_hz > 0) & (spec.frequency_hz <= max_frequency_hz)
         if not spec.amplitude[inside].any():  # of nothing there are no decibels
@@ -107,7 +108,7 @@ def spectrum_plot(
         level = 20 * np.log10(np.maximum(spec.amplitude[inside], 1e-300))
         top = max(top, float(level.max(initial=-np.inf)))
         colour = COLOURS[index % len(COLOURS)]
-        axes[index].plot(spec.frequency_hz[inside] / 1e3, level, color=colour, linewidth=0.9, label=name)
+        axes[index].plot(spec.frequency_hz[inside] / scale, level, color=colour, linewidth=0.9, label=name)
         if ax is None:
             axes[index].set_title(name, fontsize=9, color=colour, pad=3)
     for each in dict.fromkeys(axes):
@@ -115,12 +116,12 @@ def spectrum_plot(
             each.set_ylabel(f"dB re 1 {unit}")
         each.yaxis.set_major_locator(MultipleLocator(20))
         if marked_hz:
-            _mark_harmonics(each, marked_hz, max_frequency_hz, named=each is axes[0])
+            _mark_harmonics(each, marked_hz, max_frequency_hz, scale, named=each is axes[0])
     if np.isfinite(top):
         axes[0].set_ylim(top - DECIBEL_SPAN, top + 8)
     elif ax is not None:
         _say(ax, HELD)
-    axes[-1].set(xlabel="frequency [kHz]", xlim=(0, max_frequency_hz / 1e3))
+    axes[-1].set(xlabel=f"frequency [{its_name}]", xlim=(0, max_frequency_hz / scale))
     if ax is not None:
         if ax.get_legend_handles_labels()[0]:
             ax.legend()
@@ -142,12 +143,13 @@ def spectrogram_plot(
     figure, ax = panel(ax, 3.6)
     inside = content.frequency_hz <= max_frequency_hz
     amplitude = content.amplitude[inside]
+    scale, its_name = frequency_unit(max_frequency_hz)
     if not amplitude.any():
-        ax.set(xlabel="time [s]", ylabel="frequency [kHz]")
+        ax.set(xlabel="time [s]", ylabel=f"frequency [{its_name}]")
         _say(ax, HELD)
         return figure
     level = 20 * np.log10(np.maximum(amplitude / largest_of(amplitude), 1e-300))
-    time, frequency = start + content.time, content.frequency_hz[inside] / 1e3
+    time, frequency = start + content.time, content.frequency_hz[inside] / scale
     half = 0.5 * float(time[1] - time[0]) if len(time) > 1 else 0.5 / content.resolution_hz
     image = ax.imshow(
         level,
@@ -159,7 +161,7 @@ def spectrogram_plot(
         vmax=0,
         cmap="cividis",
     )
-    ax.set(xlabel="time [s]", ylabel="frequency [kHz]")
+    ax.set(xlabel="time [s]", ylabel=f"frequency [{its_name}]")
     ax.grid(False)
     figure.colorbar(image, ax=ax, pad=0.01, label=f"dB re {largest_of(amplitude):.3g} {unit}")
     return figure
@@ -191,7 +193,8 @@ def contact_force_and_velocity(
     first, last = np.searchsorted(trajectory.time, [start, end])
     part = slice(int(first), int(last) + 1)
     figure, (above, below) = stacked(axes, 2, 4.6)
-    time = 1e3 * trajectory.time[part]
+    unit, its_name = time_unit(end - start, end)
+    time = trajectory.time[part] / unit
     force = trajectory.normal_force[part, contact]
     above.plot(time, force, color=INK, linewidth=1.4, label="normal force")
     if steady_force is not None:
@@ -199,10 +202,10 @@ def contact_force_and_velocity(
     above.set_ylabel("normal force [N]")
     top = max(float(force.max(initial=0.0)), 1e-12)
     above.set_ylim(-0.04 * top, 1.08 * top)
-    _velocities(below, trajectory, part, contact, slave, np.asarray(tangent))
+    _velocities(below, trajectory, part, contact, slave, np.asarray(tangent), unit)
     zero_line(below)
-    below.set(xlabel="time [ms]", xlim=(time[0], time[-1]))
-    seen = _shade(trajectory, part, contact, (above, below))
+    below.set(xlabel=f"time [{its_name}]", xlim=(time[0], time[-1]))
+    seen = _shade(trajectory, part, contact, (above, below), unit)
     patches = [Patch(fc=STATUS_COLOURS[name], ec=GREY, lw=0.5, label=name) for name in seen]
     legend_above(above, [*above.get_legend_handles_labels()[0], *patches])
     legend_above(below)
@@ -210,8 +213,10 @@ def contact_force_and_velocity(
     return figure
 
 
-def _velocities(ax: Axes, trajectory: Trajectory, part: slice, contact: int, slave: str | None, tangent: Array) -> None:
-    time, slip = 1e3 * trajectory.time[part], trajectory.slip_speed[part, contact]
+def _velocities(
+    ax: Axes, trajectory: Trajectory, part: slice, contact: int, slave: str | None, tangent: Array, unit: float
+) -> None:
+    time, slip = trajectory.time[part] / unit, trajectory.slip_speed[part, contact]
     if slave is None:
         ax.plot(time, slip, color=BLUE, label="slave against master")
         ax.set_ylabel("slip velocity [m/s]")
@@ -222,11 +227,11 @@ def _velocities(ax: Axes, trajectory: Trajectory, part: slice, contact: int, sla
     ax.set_ylabel("tangential velocity [m/s]")
 
 
-def _shade(trajectory: Trajectory, part: slice, contact: int, axes: Sequence[Axes]) -> list[str]:
+def _shade(trajectory: Trajectory, part: slice, contact: int, axes: Sequence[Axes], unit: float) -> list[str]:
     spans = status_spans(trajectory, part, contact)
     for name, start, end in spans:
         for ax in axes:
-            ax.axvspan(1e3 * start, 1e3 * end, fc=STATUS_COLOURS[name], lw=0, zorder=0.5)
+            ax.axvspan(start / unit, end / unit, fc=STATUS_COLOURS[name], lw=0, zorder=0.5)
     return [name for name in STATUS_COLOURS if any(span[0] == name for span in spans)]
 
 
@@ -360,10 +365,10 @@ def _say(ax: Axes, words: str) -> None:
     ax.text(0.5, 0.6, words, transform=ax.transAxes, ha="center", va="center", color=GREY)
 
 
-def _mark_harmonics(ax: Axes, fundamental: float, top: float, *, named: bool) -> None:
+def _mark_harmonics(ax: Axes, fundamental: float, top: float, unit: float, *, named: bool) -> None:
     count = int(top / fundamental)
     for k in range(1, min(count, 8) + 1):
-        ax.axvline(k * fundamental / 1e3, color=GREY, linestyle=":", linewidth=0.9, zorder=1.2)
+        ax.axvline(k * fundamental / unit, color=GREY, linestyle=":", linewidth=0.9, zorder=1.2)
     if named:
         note = [Line2D([], [], color=GREY, linestyle=":", label=f"{measured(fundamental, 0)} Hz and its multiples")]
         ax.legend(handles=note, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)

@@ -23,6 +23,7 @@ from .tables import (
     same_as_printed,
     significant,
 )
+from .units import energy_unit
 from .windows import Window
 
 SAME_MODE = 0.02  # |Δλ|/|λ| within which an identified component is that mode
@@ -128,9 +129,10 @@ def energy_table(balance: EnergyBalance) -> Table:
         ("stored at the end as motion", balance.kinetic, -1),
         ("stored at the end as deformation", balance.elastic, -1),
     )
-    rows = [TableRow((name, quantity(1e3 * value, 4))) for name, value, _ in entries]
+    unit, its_name = energy_unit(max(abs(value) for _, value, _ in entries))
+    rows = [TableRow((name, quantity(value / unit, 4))) for name, value, _ in entries]
     missing = sum(sign * value for _, value, sign in entries)
-    rows.append(TableRow(("missing at the end", significant(1e3 * missing, 2)), "good" if balance.closes else "bad"))
+    rows.append(TableRow(("missing at the end", significant(missing / unit, 2)), "good" if balance.closes else "bad"))
     caption = (
         f"Largest imbalance at any time: {significant(balance.error, 2)} of the largest energy that changed hands"
         if balance.checked
@@ -141,7 +143,7 @@ def energy_table(balance: EnergyBalance) -> Table:
     elif balance.checked and balance.vibration_error is not None:
         caption += ", rounding, beside which the vibration has too little energy to be checked"
     caption += "."
-    return Table("energy", "Energy balance", ("", "energy [mJ]"), tuple(rows), frozenset({0}), caption)
+    return Table("energy", "Energy balance", ("", f"energy [{its_name}]"), tuple(rows), frozenset({0}), caption)
 
 
 def agreement_table(comparison: Comparison) -> Table:

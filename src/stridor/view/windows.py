@@ -10,6 +10,7 @@ import numpy as np
 from ..digits import measured
 from ..temporal.trajectory import STATUS, Trajectory
 from ..typing import IntArray
+from .units import later_words
 
 SEPARATION, STICK, SLIP = (STATUS.index(name) for name in ("separation", "stick", "slip"))
 SETTLED = 0.6  # of a regime has passed before it is shown
@@ -70,7 +71,7 @@ def regime_window(
 def _length(records: int, seconds: float, frequency_hz: float | None, periods: float) -> str:
     """How much is shown: periods of what, or where no frequency is known, for how long."""
     if not frequency_hz:
-        return f"{1e3 * seconds:.3g} ms ({records} records)"
+        return f"{later_words(seconds, 3)} ({records} records)"
     count = {3.0: "three"}.get(periods, f"{periods:g}")
     text = f"{count} periods of {measured(frequency_hz, 0)} Hz"
     return text if records >= ENOUGH * periods else f"{text} ({records} records)"

@@ -18,6 +18,7 @@ from .body_words import body_words, contact_words
 from .inputs import ReportInputs
 from .tables import Table, TableRow, drop_empty, significant
 from .temporal_tables import agreed, critical_row, mac_row
+from .units import frequency_words, time_unit
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ def verdict(inputs: ReportInputs) -> Verdict:
     if growing is None:
         return Verdict(_undecided(inputs), paragraph, None, agrees)
     if not growing:
-        return Verdict(f"It does not squeal{at} up to {_khz(inputs)}", paragraph, squeals, agrees)
+        return Verdict(f"It does not squeal{at} up to {_top(inputs)}", paragraph, squeals, agrees)
     if inputs.unsaturated is not None:
         still = inputs.unsaturated
         hz = measured(still.frequency_hz, 0)
@@ -126,10 +127,10 @@ def _onset_sentence(inputs: ReportInputs) -> str:
     if first is None:
         if _grows_somewhere(inputs):
             return (
-                f"No onset lies between {low:g} and {high:g} up to {_khz(inputs)}, and yet modes grow there: they do "
+                f"No onset lies between {low:g} and {high:g} up to {_top(inputs)}, and yet modes grow there: they do "
                 "so from the lower end on."
             )
-        return f"No friction coefficient between {low:g} and {high:g} makes it unstable up to {_khz(inputs)}."
+        return f"No friction coefficient between {low:g} and {high:g} makes it unstable up to {_top(inputs)}."
     damping = "" if onsets.damped else " (without damping)"
     more = sum(1 for o in onsets.onsets if not o.stabilising) - 1
     text = f"It becomes unstable from μ = {measured(first.mu, 4)} on, at {measured(first.frequency_hz, 0)} Hz{damping}"
@@ -183,10 +184,11 @@ def _growing_words(still: Unsaturated) -> str:
     )
     if still.seconds_left is None:
         return f"{text}. Make the phase “{still.phase}” longer"
+    unit, its_name = time_unit(still.seconds_left)
     return (
         f"{text}. Growing by {measured(still.growth_rate, 0)} 1/s, it takes about another "
-        f"{significant(1e3 * still.seconds_left, 2)} ms until the contact forces or the slip vibrate as much as they "
-        f"are large. To go on from there: "
+        f"{significant(still.seconds_left / unit, 2)} {its_name} until the contact forces or the slip vibrate as much "
+        f"as they are large. To go on from there: "
         f"phases.{still.phase}.duration = {still.duration:g} in the case, then stridor simulate CASE --restart "
         "CASE.out/simulate.nc, and stridor run CASE"
     )
@@ -233,8 +235,8 @@ def _agreement_sentence(inputs: ReportInputs) -> str:
     return f"{opening}{': ' if texts else ''}{'; '.join(texts)}."
 
 
-def _khz(inputs: ReportInputs) -> str:
-    return f"{inputs.max_frequency_hz / 1e3:g} kHz"
+def _top(inputs: ReportInputs) -> str:
+    return frequency_words(inputs.max_frequency_hz)
 
 
 def _listed(items: list[str]) -> str:

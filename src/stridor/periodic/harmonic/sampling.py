@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ...typing import Array, ComplexArray, IntArray
-from ..cycle import OPEN, SLIP, STICK, Change, Cycle, slip_range
+from ..cycle import OPEN, SLIP, STICK, Change, Cycle, sample_count, slip_range
 from .balance import applied_at
 from .balanced import Balanced, defect
 from .hill import hill
 
-SAMPLES = 512
+SAMPLES = 512  # of a period, or more: `sample_count`
 KEPT = 16  # of the multipliers
 ALONG, AGAINST = 2, 3  # slip, as a change tells it
 
@@ -20,11 +20,11 @@ def sampled_series(cycle: Balanced, reached_from: str) -> Cycle:
     less than the period of the last harmonic is not told: a stick so short counts as the slip around it, slip so short
     beside stick as stick, slip so short amid slip the other way as that."""
     at, family = cycle.at, cycle.family
-    times = np.linspace(0.0, cycle.period, SAMPLES)
     phases = 2 * np.pi * np.arange(at.base.samples) / at.base.samples
     ways = _ways(cycle)
-    normal, friction, slip, gap, _ = _at(cycle, 2 * np.pi * times / cycle.period, ways)
     fine = _at(cycle, phases, ways)
+    times = np.linspace(0.0, cycle.period, sample_count(np.vstack([fine[0], fine[3]]).T, SAMPLES))
+    normal, friction, slip, gap, _ = _at(cycle, 2 * np.pi * times / cycle.period, ways)
     codes = np.stack([without_short(row, at.base.harmonics) for row in fine[4]])
     shares = np.stack([np.mean(codes == kind, axis=1) for kind in (OPEN, STICK)], axis=1)
     index = np.minimum((times / cycle.period * at.base.samples).astype(int), at.base.samples - 1)
