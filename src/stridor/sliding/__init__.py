@@ -2,7 +2,7 @@
 
 from .equilibrium import share_factors
 from .motions import full_motion, slip_speeds
-from .pressing import anything_acts, least_force, nothing_presses, require_pressed, taken_as_closed
+from .pressing import anything_acts, least_force, nothing_presses, require_pressed, taken_as_closed, unstressed
 from .resultants import Balance, Resultant
 from .solution import SteadySliding, force_rates, friction_damping_matrix, steady_nodes, steady_sliding, touching
 
@@ -23,4 +23,5 @@ __all__ = [
     "steady_sliding",
     "taken_as_closed",
     "touching",
+    "unstressed",
 ]
