@@ -258,3 +258,22 @@ def test_a_scheduler_that_does_not_answer(case: st.Case, tmp_path: Path, monkeyp
     monkeypatch.setattr(cluster, "PATIENCE", 0.5)
     with pytest.raises(st.AnalysisError, match=r"tcp://127\.0\.0\.1:9 does not answer within 0\.5 s"):
         st.run_study(st.Study(case=case, parameters=GOOD), tmp_path, scheduler="tcp://127.0.0.1:9")
+
+
+def test_names_of_the_parameters_of_the_case_stand_for_their_values(case: st.Case) -> None:
+    named = case.with_({"parameters": {"a": {"value": 1.0}, "mu2": {"value": 2.0}}})
+    study = st.Study(
+        case=named, sampling=RANDOM, parameters={"mu2": NORMAL, "mu": {**NORMAL, "low": 0.0}, "a": NORMAL},
+        correlation={"of": ("a", "mu"), "matrix": ((1.0, 0.2), (0.2, 1.0))},
+    )  # fmt: skip
+    assert list(study.parameters) == ["parameters.mu2.value", "mu", "parameters.a.value"]
+    assert study.correlation is not None
+    assert study.correlation.of == ("parameters.a.value", "mu")
+    assert st.Study.from_document(study.document()).parameters == study.parameters
+    path = "parameters.a.value"
+    with pytest.raises(CaseError, match=r"^parameters\.a: is parameters\.a\.value, which is given too; give it once$"):
+        st.Study(case=named, sampling=RANDOM, parameters={"a": NORMAL, path: NORMAL})
+    with pytest.raises(CaseError, match=r"^b: no such number|^parameters: b: no such number"):
+        st.Study(case=named, sampling=RANDOM, parameters={"b": NORMAL})
+    with pytest.raises(CaseError, match=r"^a: an entry of \[parameters\], whose value is parameters\.a\.value$"):
+        st.sensitivities(named, ["a"])

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from pydantic import BaseModel
 
 import stridor as st
@@ -19,8 +20,11 @@ from stridor.case import Case, loads, template_text
 from stridor.case.oddities import radians_meant
 from stridor.case.schema import ENTRIES
 from stridor.case.usual import USUAL, WITHOUT, usual_of
+from stridor.direct import SingularMatrix, factorise
 from stridor.errors import AnalysisError, CaseError
-from stridor.sliding import steady_sliding
+from stridor.sliding import far_apart, steady_sliding
+from stridor.sliding.scales import moved_most
+from stridor.sliding.solution import _loose
 from stridor.system import build_system
 from stridor.system.uncoupled import _apart
 
@@ -423,6 +427,57 @@ def test_a_contact_as_good_as_without_stiffness(stiffness: float) -> None:
     for analysis in (lambda case: st.modes(case, 0.1), st.onsets):
         with pytest.raises(AnalysisError, match=r"no normal force|no contact carries load"):
             analysis(held)
+
+
+def test_stiffnesses_too_far_apart_are_not_said_to_leave_a_body_free() -> None:
+    """Beam 2 is clamped; what it resists with is rounding beside a beam 1 of a thousand kilometres' width."""
+    wide = BENCH.with_({"bodies.beam1.elements": 3, "bodies.beam2.elements": 6, "bodies.beam1.width": 1e6})
+    for analysis in (st.steady_sliding, lambda case: st.modes(case, 0.0), st.onsets):
+        with pytest.raises(AnalysisError, match="stiffnesses lie too far apart") as told:
+            analysis(wide)
+        assert "can move freely" not in str(told.value)
+        assert "e+16 at beam1 node" in str(told.value)
+        assert "what body beam2 resists a motion with is 3e-13 of the terms there" in str(told.value)
+    loose = BENCH.with_({"bodies.beam1.elements": 3, "bodies.beam2.elements": 6, "supports.clamp.fixed": ["x"]})
+    with pytest.raises(AnalysisError, match="body beam2 can move freely"):
+        st.steady_sliding(loose)
+    system = build_system(BENCH)
+    assert far_apart(system) == ""
+    motion = np.zeros(system.size)
+    motion[system.lines[1].freedoms] = np.linspace(0.0, 1.0, len(system.lines[1].freedoms))
+    assert moved_most(system, motion).resisted
+    said = _loose(system, system.contact_nodes(), motion)
+    assert "in a motion of body beam2 that its own stiffness resists" in said
+    assert "body beam2 can move freely" in _loose(system, system.contact_nodes(), motion, far=True)  # beyond any size
+
+
+def test_a_spring_stiffer_than_digits_tell_is_named() -> None:
+    block = {
+        "type": "solid", "model": "3d", "material": "steel",
+        "mesh": {"shape": "block", "corner": [0.0, 0.0, 0.0], "size": [0.04, 0.02, 0.01], "divisions": [2, 1, 1],
+                 "cells": "hexahedron"}, "points": {"q": [0.0, 0.0, 0.01]},
+    }  # fmt: skip
+    case = Case(
+        materials={"steel": {"young_modulus": 2e11, "density": 7800.0, "poisson_ratio": 0.3}},
+        bodies={"up": block, "floor": {"type": "obstacle", "shape": "flat", "point": (0, 0, 0), "normal": (0, 0, 1),
+                                       "sliding": {"velocity": (1.0, 0.0, 0.0)}}},
+        supports={"guide": {"at": "up.top", "fixed": ["x", "y"]}},
+        loads={"press": {"at": "up.top", "force": (0.0, 0.0, -100.0)}},
+        springs={"s": {"between": ("up.q", "ground"), "stiffness": 1e24, "direction": (0.0, 0.0, 1.0)}},
+        contacts={"rub": {"slave": "up.bottom", "master": "floor", "stiffness": 1e12,
+                          "friction": {"law": "coulomb", "coefficient": 0.4}}},
+        modal={"max_frequency_hz": 50000.0},
+    )  # fmt: skip
+    with pytest.raises(AnalysisError, match="stiffnesses lie too far apart for the 16 digits of a number: the stiffness"):
+        st.modes(case, 0.1)
+    told = far_apart(build_system(case))
+    assert "1e+24 at up node " in told
+    assert "e+15 times the " in told
+    # Rows of unlike size tell nothing of what resists.
+    with pytest.raises(SingularMatrix, match="rows have entries up to 1e\\+30 and up to 1, too far apart"):
+        factorise(sp.csr_array(np.array([[1e30, 1e30, 0.0], [1e30, 1e30, 1.0], [0.0, 1.0, 1.0]])))
+    with pytest.raises(SingularMatrix, match="nothing resists a motion of freedom"):
+        factorise(sp.csr_array(np.array([[1.0, -1.0], [-1.0, 1.0]])))
 
 
 def test_verbs_warn_of_friction_that_is_asked_for(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:

@@ -178,6 +178,42 @@ def test_a_result_that_finds_no_room_anywhere_is_printed(
     assert "No space left on device" in document["warnings"][-1]
 
 
+def test_a_reduced_model_that_finds_no_room_keeps_no_results_from_being_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "case.toml").write_text(st.loads(template_text("two-beams"), COARSE).text, encoding="utf-8")
+    own = Path.replace
+    full = ["full"]
+
+    def no_room(self: Path, target: Path) -> Path:
+        if any(name in Path(target).parts for name in full):
+            raise OSError(28, "No space left on device")
+        return own(self, target)
+
+    monkeypatch.setattr(Path, "replace", no_room)
+    words = ("reduce", "case.toml", "--box", "mu=0:0.3", "--at", "mu=0.1", "--save", "full/m.npz", "--out", "x")
+    done = stridor(*words, cwd=tmp_path)
+    assert done.returncode == 1
+    assert "Modes of the reduced model" in done.stdout
+    assert sorted(p.name for p in (tmp_path / "x").iterdir()) == ["reduced.csv", "reduced.nc", "reduced.png"]
+    (model,) = tmp_path.glob("case-*-m.npz")
+    # As one line on a terminal of any width.
+    told = " ".join(done.stderr.split())
+    assert f"cannot write full/m.npz: No space left on device; the model is in {model}" in told
+    assert stridor("reduce", model.name, "--at", "mu=0.1", "--out", "y", cwd=tmp_path).returncode == 0
+    model.unlink()
+    # Where there is no room for results either, both are told.
+    full += ["x", *tmp_path.parts]
+    as_json = stridor(*words, "--json", cwd=tmp_path)
+    assert as_json.returncode == 1
+    document = json.loads(as_json.stdout)
+    assert (document["files"], len(document["modes"])) == ([], 1)
+    assert "cannot write full/m.npz: No space left on device" in document["warnings"][-2]
+    assert "cannot write x/reduced.nc: No space left on device" in document["warnings"][-1]
+    assert "cannot write full/m.npz" in as_json.stderr
+    assert "cannot write x/reduced.nc" in as_json.stderr
+
+
 def test_what_is_written_through_a_stream_is_what_was_given(run_file: Path, tmp_path: Path) -> None:
     run = st.open(run_file)
     again = st.open(st.save(run, tmp_path / "again.nc"))

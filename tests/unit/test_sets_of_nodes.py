@@ -366,7 +366,7 @@ def test_where_what_moves_is_not_known_the_structure_is_named() -> None:
 
 
 def test_forces_alone_that_move_are_contact_that_holds_twice() -> None:
-    system = SimpleNamespace(size=2, lines=(), solids=(), dof_names=("a", "b"))
+    system = SimpleNamespace(size=2, lines=(), solids=(), dof_names=("a", "b"), stiffness=sp.csr_array((2, 2)))
     nodes = SimpleNamespace(names=("A", "B"))
     said = history._unheld(system, nodes, "steady.steps.1", np.array([1e-7, 0, 0.5, -0.5]))
     assert said.startswith("static equilibrium, steady.steps.1: contact holds the same freedoms twice (contacts: A, B)")

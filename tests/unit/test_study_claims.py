@@ -6,12 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import stridor as st
 from program import stridor
 from stridor.case import template_text
 from stridor.studies.effect import without_effect
 from stridor.studies.reduced_rows import FrictionModels
+from stridor.studies.result import StudyResult
 from stridor.studies.sampling import samples
 
 FEW = ["bodies.beam1.elements=3", "bodies.beam2.elements=6", "modal.max_frequency_hz=3e3"]
@@ -119,6 +121,25 @@ def test_of_few_rows_one_at_least_is_confirmed(case: st.Case, tmp_path: Path) ->
         assert int(np.count_nonzero(found.data["confirmed"].values > 0)) >= expected
         if not expected:
             assert not np.any(found.data["confirmed"].values[found.data["source"].values == "reduced"] > 0)
+
+
+def test_estimates_are_told_of_rows_that_stand_on_a_model_alone() -> None:
+    def said(source: list[str], error: list[float], confirmed: list[int], off: list[float]) -> str:
+        data = xr.Dataset(
+            {"status": ("row", np.ones(len(source))), "source": ("row", source), "estimated_error": ("row", error),
+             "confirmed": ("row", confirmed), "difference": ("row", off)}, attrs={"study": '{"compute": "modes"}'},
+        )  # fmt: skip
+        return StudyResult(Path("none"), data)._confirmed()[0]
+
+    limit = "by a reduced model alone, estimated error 1.0e-09 at most; 1 solved in full as well, off by 3.0e-10 at most"
+    nan = float("nan")
+    told = said(["reduced", "full"], [1e-9, 1e-7], [0, 1], [nan, 3e-10])
+    assert told == f"1 rows {limit}, none by more than 10 times the estimate or 1e-09"
+    # Of an undamped system's double roots an estimate may say nothing.
+    assert said(["full", "full"], [1.6e18, 1e-9], [1, 1], [2e-9, 1e-10]) == (
+        "no rows by a reduced model alone; 2 solved in full as well, off by 2.0e-09 at most"
+    )
+    assert said(["reduced"], [1.6e18], [0], [nan]) == "1 rows by a reduced model alone; 0 solved in full as well"
 
 
 def test_onsets_of_a_model_that_holds_its_contact_nodes_are_headed_so(capsys: pytest.CaptureFixture[str]) -> None:

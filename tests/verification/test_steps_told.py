@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import stridor as st
+from mode_coupling import mode_coupling
+from random_contacts import pressed_frame
 from stridor.app.show import show_run
 from stridor.study.description import describe
+from stridor.system import build_system
+from stridor.temporal.highest import highest_hz
 from stridor.temporal.settings import Settings, coarse
 
 pytestmark = pytest.mark.verification
@@ -108,6 +113,42 @@ def test_only_explicit_steps_that_are_few_are_told() -> None:
         words = coarse(0.1 / highest, Settings(max_frequency_hz=float(highest)), "nodal")
         step = float(words.partition("temporal.step = ")[2].split()[0])
         assert 80.0 * (1 - 1e-9) <= 1.0 / (step * highest) < 90.0
+
+
+def test_steps_are_not_told_of_modes_that_no_system_of_these_masses_has(capsys: pytest.CaptureFixture[str]) -> None:
+    """Modes of the minimal model lie up to 0.28 Hz, and its default step is 80 to the period of the highest one."""
+    case = mode_coupling(damping=0.02).with_(
+        {"temporal.stepper": "explicit", "temporal.step": None, "temporal.perturbation": 1e-3}
+    )
+    run = st.simulate(case)
+    assert run.step * 1.0 * 40 > 1.0  # few to the period of modal.max_frequency_hz
+    assert run.remarks == ()
+    assert not any("to the period of modal" in said for said in describe(case).lines)
+    system, asked = build_system(case), Settings(max_frequency_hz=1.0)
+    top = highest_hz(system)
+    assert coarse(1 / (41 * top), asked, "assembled", system) == ""
+    assert coarse(1 / (39 * top), asked, "assembled", system)
+    # A stiff contact has modes above those of the springs that the step is of.
+    stiff = case.with_({"contacts.rub.stiffness": 100.0})
+    assert any("to the period of modal" in said for said in st.simulate(stiff).remarks)
+    assert highest_hz(build_system(case.with_({"contacts.rub.stiffness": "rigid"}))) == np.inf
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_mode_lies_above_the_highest_there_can_be(seed: int) -> None:
+    mu = 0.1 * (1 + seed % 8)
+    system = pressed_frame(seed, mu, rigid=False, damping=0.05 * (seed % 3))
+    nodes, n = system.contact_nodes(), system.size
+    mass, damping, stiffness = (m.toarray() for m in (system.mass, system.damping, system.stiffness))
+    top, highest = highest_hz(system), 0.0
+    for closed in product((0.0, 1.0), repeat=nodes.count):
+        for sense in product((-1.0, 1.0), repeat=nodes.count):
+            push = nodes.normal.toarray() + mu * np.array(sense)[:, None] * nodes.tangent.toarray()
+            springs = push.T @ np.diag(np.array(closed) / nodes.compliance) @ nodes.normal.toarray()
+            a = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(mass, stiffness + springs),
+                                                          -np.linalg.solve(mass, damping)]])  # fmt: skip
+            highest = max(highest, float(np.abs(np.linalg.eigvals(a)).max()) / (2 * np.pi))
+    assert highest <= top < 3 * highest
 
 
 def test_a_run_without_contacts_shows_no_table_of_contacts(capsys: pytest.CaptureFixture[str]) -> None:

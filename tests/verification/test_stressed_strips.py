@@ -19,6 +19,7 @@ from stridor.study.without_effect import without_effect
 pytestmark = pytest.mark.verification
 
 LENGTH, HEIGHT, DEPTH = 0.5, 1e-3, 0.01
+THICK = 0.01  # of what stands as a column
 YOUNG, DENSITY, STRAIN = 2e11, 7800.0, 1e-3
 
 
@@ -111,3 +112,46 @@ def test_beside_beams_in_point_contact_too() -> None:
     found = st.modes(case.with_({"modal.max_frequency_hz": 500.0, "modal.prestress": True}), 0.0).frequency_hz[0]
     for one in tensioned()[:2]:
         assert np.abs(found / one - 1).min() < 3e-3
+
+
+
+def column(force: float | None, **more: Any) -> st.Case:
+    """A strip held at both ends of its axis, under a force [N] along it; None: without any load."""
+    return strip(**more).with_({
+        "bodies.strip.mesh.divisions": [20, 2], "bodies.strip.points": {"a": [0.0, 0.0], "b": [LENGTH, 0.0]},
+        "bodies.strip.mesh.corner": [0.0, -THICK / 2], "bodies.strip.mesh.size": [LENGTH, THICK], "supports": {
+            "left": {"at": "strip.a", "fixed": ["x", "y"]}, "right": {"at": "strip.b", "fixed": ["y"]},
+        }, "loads": {} if force is None else {"push": {"at": "strip.right", "force": [force, 0.0]}},
+    })  # fmt: skip
+
+
+def test_a_column_without_load_has_its_plain_modes() -> None:
+    plain = st.modes(column(None, prestress=False), 0.0)
+    for case in (column(None), column(0.0)):
+        assert st.modes(case, 0.0).frequency_hz == pytest.approx(plain.frequency_hz, rel=1e-9)
+    # Nothing need hold it for that.
+    loose = column(None).with_({"supports": {}})
+    free = st.modes(loose.with_({"modal.prestress": False}), 0.0)
+    assert st.modes(loose, 0.0).eigenvalues == pytest.approx(free.eigenvalues, rel=1e-9)
+    # Where nothing tells the force that presses contacts, its stresses are not known.
+    rubbing = column(None).with_({
+        "bodies.belt": {"type": "obstacle", "shape": "flat", "point": [0.0, -THICK / 2], "normal": [0.0, 1.0],
+                        "sliding": {"velocity": [-1.0, 0.0]}},
+        "contacts": {"rub": {"slave": "strip.b", "master": "belt", "stiffness": 1e6,
+                             "friction": {"law": "coulomb", "coefficient": 0.3}}},
+    })  # fmt: skip
+    with pytest.raises(AnalysisError, match="prestress needs the normal force"):
+        st.modes(rubbing, 0.1)
+
+
+def test_reduced_models_of_a_column_follow_its_load_through_zero() -> None:
+    euler = np.pi**2 * YOUNG * DEPTH * THICK**3 / 12 / LENGTH**2
+    plain = st.modes(column(None, prestress=False), 0.0).frequency_hz[0]
+    model = st.reduced_model(column(0.0), {"loads.push.force.0": (-0.9 * euler, 0.9 * euler)})
+    for share in (-0.8, 0.0, 0.5):
+        found = model.modes({"loads.push.force.0": share * euler}).frequency_hz
+        assert found[:2] == pytest.approx(plain[:2] * np.sqrt(1 + share / np.array([1, 4])), rel=1e-3)
+    held = st.reduced_model(column(-0.8 * euler), {"materials.steel.density": (7000.0, 8000.0)})
+    assert held.modes({"materials.steel.density": DENSITY}).frequency_hz[0] == pytest.approx(
+        plain[0] * np.sqrt(0.2), rel=1e-3
+    )

@@ -45,7 +45,8 @@ class Call:
     far, each of which is said once; idle: finds settings without effect on what the verb computes, which are told with
     its results, for it may take the model.
     asked: options that stand for settings of the case, as they were given. unwritten, lost: files of results that could
-    not be written, and why, which is told behind the results; later: whether it is, or raises at once.
+    not be written, and why, which is told behind the results; aside: why files of places of their own could not, which
+    keeps no others from being written; later: whether it is told behind the results, or raises at once.
     """
 
     path: Path
@@ -63,6 +64,7 @@ class Call:
     stack: ExitStack = field(default_factory=ExitStack)
     unwritten: list[Path] = field(default_factory=list[Path])
     lost: list[AnalysisError] = field(default_factory=list[AnalysisError])
+    aside: list[AnalysisError] = field(default_factory=list[AnalysisError])
     later: bool = True
 
     def claim(self) -> None:
@@ -158,7 +160,7 @@ class Call:
 
         self.warn_of_idle()
         own = [w for w in document.get("warnings", ()) if w not in self.told]
-        lost = [str(error) for error in self.lost]
+        lost = [str(error) for error in (*self.aside, *self.lost)]
         if "files" in document:
             missing = {str(path) for path in self.unwritten}
             document = document | {"files": [name for name in document["files"] if name not in missing]}
@@ -283,18 +285,29 @@ class Call:
             try:
                 save(result, path)
             except AnalysisError as error:
-                raise AnalysisError(f"{error}; the result is in {self._elsewhere(result, name, error)}") from None
+                elsewhere = self._elsewhere(lambda other: save(result, other), name, error)
+                raise AnalysisError(f"{error}; the result is in {elsewhere}") from None
 
         return self.write(path, saved)
 
-    def _elsewhere(self, result: Result, name: str, error: AnalysisError) -> Path:
-        """Save what was computed where there is room for it. Raises the error that there was where there is none."""
-        from ..io.datasets import save
+    def keep_at(self, path: Path, what: str, write: Callable[[Path], Path]) -> Path:
+        """Write a file at a place of its own, or where there is room for it, and say so. That it could not be written
+        is told behind the results, which are written all the same."""
+        try:
+            self.say(f"written: {write(path)}")
+        except AnalysisError as error:
+            self.unwritten.append(path)
+            self.aside.append(error)
+            with suppress(AnalysisError):  # told already where there is room nowhere
+                self.aside[-1] = AnalysisError(f"{error}; {what} is in {self._elsewhere(write, path.name, error)}")
+        return path
 
+    def _elsewhere(self, write: Callable[[Path], Path], name: str, error: AnalysisError) -> Path:
+        """Save what was computed where there is room for it. Raises the error that there was where there is none."""
         for folder in (Path.cwd(), Path(tempfile.gettempdir())):
             path = folder / f"{self.path.stem}-{os.getpid()}-{name}"
             with suppress(AnalysisError):
-                return save(result, path)
+                return write(path)
         raise error
 
 
@@ -397,14 +410,15 @@ def verb(
                 except CaseError as error:
                     raise by_option(error, options, as_given) from error
                 except AnalysisError as error:
-                    call.warn([str(lost) for lost in call.lost if lost is not error])
+                    call.warn([str(lost) for lost in (*call.aside, *call.lost) if lost is not error])
                     raise
                 except typer.Exit:
-                    if not call.lost:
+                    if not call.lost and not call.aside:
                         raise
             call.warn_of_idle()
-            for lost in call.lost:
-                raise lost
+            if lost := [*call.aside, *call.lost]:
+                call.warn([str(error) for error in lost[:-1]])
+                raise lost[-1]
             interrupts.check()
 
         order = (case.replace(annotation=file), *own, *common)

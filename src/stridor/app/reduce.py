@@ -100,10 +100,10 @@ def reduce(
     for note in notes:
         call.say(f"note: {note}")
     call.warn(model.problem.idle_words)
-    files = [] if save is None else [_saved(model, save, origin, keep)]
+    files: list[Path] = []
+    if save is not None:
+        files.append(call.keep_at(save, "the model", lambda path: _saved(model, path, origin, keep)))
     chosen = None if call.solver in (None, "auto") else call.solver
-    for path in files:
-        call.say(f"written: {path}")
     points: list[dict[str, Any]] = []
     unlike: tuple[str, ...] = ()
     if asked:

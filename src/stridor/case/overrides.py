@@ -117,6 +117,8 @@ def number_at(data: dict[str, Any], path: str) -> float:
             node = cast("dict[str, Any]", node)[step]
         else:
             known = cast("dict[str, Any]", node) if isinstance(node, dict) else ()
+            if len(steps) == 1 and step in (data.get("parameters") or {}):
+                raise CaseError(here, None, f"an entry of [parameters], whose value is parameters.{step}.value")
             raise CaseError(here, None, f"no such number{choice(step, known, f'{before} has')}")
     if not isinstance(node, float):
         given = None if isinstance(node, dict) else node

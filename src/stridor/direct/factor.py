@@ -122,6 +122,15 @@ class Factor:
         return answer[:, 0] if given.ndim == 1 else answer
 
     @property
+    def span(self) -> tuple[float, float] | None:
+        """The largest and the smallest of the rows' largest entries, where they are so far apart that rounding of one
+        is more than the other, and no motion can be said to be resisted or not; else None."""
+        if not len(self._sizes.rows):
+            return None
+        high, low = float(np.max(self._sizes.rows)), float(np.min(self._sizes.rows))
+        return (high, low) if low < SINGULAR * high else None
+
+    @property
     def inertia(self) -> int | None:
         """See the class. Raises ValueError once the factors are freed."""
         if self._backend is None:
@@ -274,6 +283,8 @@ def require_regular(factor: Factor, ratio: float, motion: Any) -> None:
     if ratio < SINGULAR:
         factor.free()
         at = "" if motion is None else f"; nothing resists a motion of freedom {int(np.argmax(np.abs(motion)))}"
+        if (span := factor.span) is not None:
+            at = f"; rows have entries up to {span[0]:.3g} and up to {span[1]:.3g}, too far apart for its digits"
         raise SingularMatrix(f"the matrix is singular to working precision{at}", motion)
 
 

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from ..errors import CaseError
+from ..sliding import unstressed
 from ..system import System
 from ..threads import one_thread
 from ..typing import Array
@@ -57,7 +58,7 @@ def complex_modes(
     values = np.atleast_1d(np.asarray(mu, dtype=float))
     if values.ndim != 1 or not len(values) or not np.all(np.isfinite(values)) or np.any(values < 0):
         raise CaseError("mu", mu, "friction coefficients are numbers ≥ 0, at least one")
-    options = Options(friction_damping, prestress, solver, source)
+    options = Options(friction_damping, prestress and not unstressed(system), solver, source)
     highest = float(values.max())
     refuse_undetermined(system, highest, options, touching_at=highest if len(values) == 1 else None)
     asked = ModesAsked(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import CaseError
+from ..sliding import unstressed
 from ..system import System
 from ..threads import one_thread
 from .krylov import Carried
@@ -47,7 +48,7 @@ def onsets(
         raise CaseError("friction_range", friction_range, "two numbers 0 ≤ a < b")
     if not (np.isfinite(max_frequency_hz) and max_frequency_hz > 0):
         raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
-    options = Options(friction_damping, prestress, solver, source)
+    options = Options(friction_damping, prestress and not unstressed(system), solver, source)
     refuse_undetermined(system, high, options)
     asked = ModesAsked(
         max_frequency_hz, damped=damped, options=options, follow=follow, numbered_at=numbered_at, carried=carried

@@ -16,7 +16,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol, TypeVar
 
+from ..direct import SingularMatrix
 from ..errors import AnalysisError, CaseError, FollowingError
+from ..sliding import far_apart
 from ..system import System
 from ..system.uncoupled import no_complete_basis
 from ..typing import Array
@@ -234,8 +236,20 @@ def answered(
 ) -> Answer:
     """The answer of the first source that serves.
 
-    without_following: whether a source that follows no branches is asked where they cannot be told apart.
+    without_following: whether a source that follows no branches is asked where they cannot be told apart. Raises
+    SingularMatrix in words of the system where its stiffnesses lie too far apart.
     """
+    try:
+        return _answered(system, asked, ask, without_following=without_following)
+    except SingularMatrix as error:
+        if apart := far_apart(system):
+            raise SingularMatrix(apart, error.motion) from error
+        raise
+
+
+def _answered(
+    system: System, asked: ModesAsked, ask: Callable[[EigenSource, ModesAsked], Answer], *, without_following: bool
+) -> Answer:
     *first, last = sources_for(system, asked.options)
     for source in first:
         try:

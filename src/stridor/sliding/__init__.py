@@ -2,8 +2,9 @@
 
 from .equilibrium import share_factors
 from .motions import full_motion, slip_speeds
-from .pressing import anything_acts, least_force, nothing_presses, require_pressed, taken_as_closed
+from .pressing import anything_acts, least_force, nothing_presses, require_pressed, taken_as_closed, unstressed
 from .resultants import Balance, Resultant
+from .scales import far_apart
 from .solution import SteadySliding, force_rates, friction_damping_matrix, steady_nodes, steady_sliding, touching
 
 __all__ = [
@@ -11,6 +12,7 @@ __all__ = [
     "Resultant",
     "SteadySliding",
     "anything_acts",
+    "far_apart",
     "force_rates",
     "friction_damping_matrix",
     "full_motion",
@@ -23,4 +25,5 @@ __all__ = [
     "steady_sliding",
     "taken_as_closed",
     "touching",
+    "unstressed",
 ]

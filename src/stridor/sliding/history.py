@@ -12,6 +12,7 @@ from ..errors import AnalysisError
 from ..system import System
 from ..system.load_steps import LoadStep
 from ..typing import Array
+from .scales import moved_most, owner
 from .stick_slip import Frictional, Loading, StickSlip, increments_of
 
 # Slip below this part of the fastest node's is that of the centre of a spin: its direction is rounding.
@@ -103,6 +104,8 @@ def _unheld(system: System, nodes: ContactNodes, where: str, motion: Array | Non
                 f"{', '.join(nodes.names)}), so that its forces cannot be told apart; give the contacts a stiffness or "
                 "take nodes that two of them share out of one"
             )
+    if motion is not None and (apart := moved_most(system, motion[:n]).apart):
+        return f"the static equilibrium in {where} cannot be told: {apart}"
     return (
         f"no static equilibrium in {where}: friction at its limit does not hold the loads, and "
         f"{_moved(system, motion)} slides or moves freely; lower the load, raise the friction coefficient, or hold "
@@ -111,11 +114,4 @@ def _unheld(system: System, nodes: ContactNodes, where: str, motion: Array | Non
 
 
 def _moved(system: System, motion: Array | None) -> str:
-    if motion is None:
-        return "the structure"
-    freedom = int(np.argmax(np.abs(motion[: system.size])))
-    for body in (*system.lines, *system.solids):
-        if np.any(body.freedoms == freedom):
-            return f"body {body.name}"
-    return system.dof_names[freedom] if freedom < len(system.dof_names) else f"freedom {freedom}"
-
+    return "the structure" if motion is None else owner(system, int(np.argmax(np.abs(motion[: system.size]))))[0]

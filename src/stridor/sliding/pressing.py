@@ -7,6 +7,7 @@ import numpy as np
 from ..errors import AnalysisError
 from ..system import System
 from ..typing import Array, BoolArray
+from .motions import full_motion
 
 PULLS = 1e-12  # of the largest contact force: a pull that is no more is rounding
 NOTHING = 1e-9  # of all loads together, each by itself: what their sum leaves as rounding
@@ -32,6 +33,14 @@ def anything_acts(system: System) -> bool:
     decides by that asks here.
     """
     return bool(system.loads or system.load_steps or any(system.motion.full_distance))
+
+
+def unstressed(system: System) -> bool:
+    """Whether a structure without contacts carries no force at all: it need not be held for its steady state to be
+    known, which has no stresses."""
+    if system.contact_nodes().count or anything_acts(system):
+        return False
+    return not np.any(system.motion.damping @ full_motion(system))
 
 
 def nothing_presses(system: System, normal_force: Array) -> bool:

@@ -28,6 +28,7 @@ from .pressing import pulled
 from .redundant import closed, nearly_one, redundant
 from .result import OtherEquilibrium, SteadySliding
 from .resultants import balance, resultants
+from .scales import moved_most, owner
 
 ALL_TRIED = 5  # nodes of which it is looked whether other sets are in equilibrium as well
 PRESSED = 1e-12  # of the largest force on a freedom: contact forces no larger are rounding of it
@@ -374,11 +375,14 @@ def _require_slip(nodes: ContactNodes, slips: BoolArray, coefficient: Array, tou
             )
 
 
-def _loose(system: System, nodes: ContactNodes, motion: Array | None) -> str:
+def _loose(system: System, nodes: ContactNodes, motion: Array | None, *, far: bool = False) -> str:
+    """What to say of a motion that meets no resistance; far: that it goes beyond any size for that is known."""
     if twice := redundant(system, nodes, nodes.compliance == 0.0):
         return twice
-    n = system.size
-    who = "the structure" if motion is None else _moved_most(system, np.abs(motion[:n]))
+    moved = None if motion is None else moved_most(system, motion[: system.size])
+    if moved is not None and moved.resisted and (moved.apart or not far):
+        return f"steady sliding cannot be told: {moved.apart or _balanced(moved.who)}"
+    who = "the structure" if moved is None else moved.who
     return (
         f"steady sliding has no equilibrium: {who} can move freely under the loads; fix a freedom of the loose "
         "body, or turn the load so that it presses the bodies together"
@@ -386,11 +390,15 @@ def _loose(system: System, nodes: ContactNodes, motion: Array | None) -> str:
 
 
 def _moved_most(system: System, size: Array) -> str:
-    freedom = int(np.argmax(size))
-    for body in (*system.lines, *system.solids):
-        if np.any(body.freedoms == freedom):
-            return f"body {body.name}"
-    return system.dof_names[freedom] if freedom < len(system.dof_names) else f"freedom {freedom}"
+    return owner(system, int(np.argmax(size)))[0]
+
+
+def _balanced(who: str) -> str:
+    return (
+        f"its equations are singular to working precision, in a motion of {who} that its own stiffness resists; forces "
+        "of contact and friction push on as hard there: change the friction coefficient, the contact stiffness or what "
+        "holds the body"
+    )
 
 
 def _require_held(
@@ -413,5 +421,5 @@ def _require_held(
             f"forces of up to {largest:.3g} N: loads, interference or gaps are beyond what the stiffness takes in "
             "small displacements; check their units and digits"
         )
-    raise AnalysisError(_loose(system, nodes, state.displacement))
+    raise AnalysisError(_loose(system, nodes, state.displacement, far=farthest > limit))
 

@@ -18,7 +18,7 @@ from ..case.overrides import override
 from ..errors import CaseError
 from ..notebook import Shown, counted
 from ..reading import irregular
-from .checks import problems_within
+from .checks import FRICTION, problems_within
 from .tables import Answers, Compute, Correlation, Goal, Keep, Sampling, Varied
 
 LARGEST = 2**22  # bytes of a study file
@@ -29,7 +29,8 @@ class Study(Shown, Table):
 
     st.Study(case="two-beams.toml", compute="modes", parameters={"mu": {"range": (0.0, 0.5), "points": 21}}), or
     `Study.load` of a TOML file with the same tables. parameters: by the dotted paths of ``--set``; "mu" is the friction
-    coefficient of every contact. set: changes of the case that hold for all samples. Raises CaseError.
+    coefficient of every contact, and the name of an entry of the case's [parameters] stands for the path of its value,
+    by which the study has it then. set: changes of the case that hold for all samples. Raises CaseError.
     """
 
     title: str = Field(default="", description="a text")
@@ -57,8 +58,25 @@ class Study(Shown, Table):
             super().__init__(**tables)
         except ValidationError as error:
             raise CaseError.many(problems_of(error, tables, type(self))) from None
+        self._name_in_full()
         if problems := problems_within(self):
             raise CaseError.many(problems)
+
+    def _name_in_full(self) -> None:
+        """Paths in place of bare names of the case's [parameters]: every other part of a study goes by paths. Raises
+        CaseError where one is given both ways."""
+        bare = [path for path in self.parameters if "." not in path and path != FRICTION]
+        entries = self.base().parameters if bare else {}
+        full = {name: f"parameters.{name}.value" for name in bare if name in entries}
+        if twice := [name for name, path in full.items() if path in self.parameters]:
+            raise CaseError(f"parameters.{twice[0]}", None, f"is {full[twice[0]]}, which is given too; give it once")
+        if not full:
+            return
+        renamed = {full.get(path, path): varied for path, varied in self.parameters.items()}
+        object.__setattr__(self, "parameters", renamed)
+        if self.correlation is not None:
+            of = tuple(full.get(name, name) for name in self.correlation.of)
+            object.__setattr__(self, "correlation", self.correlation.model_copy(update={"of": of}))
 
     @property
     def _line(self) -> str:

@@ -207,7 +207,7 @@ def _time_lines(case: Case, system: System, data: dict[str, Any]) -> list[str]:
         share = "which is that of the records alone"
     elif path == "implicit":
         share = f"{1.0 / (step * case.modal.max_frequency_hz):.3g} to the period of modal.max_frequency_hz"
-    few = coarse(step, settings, path)
+    few = coarse(step, settings, path, settings.system(system))
     phases, motion = phases_of(case), system.motion
     schedule = lay_out(phases, step, list(system.loads), list(motion.names), motion.full_distance)
     misfit = schedule.uneven(phases) if path in ("exact", "implicit") else schedule.stretched(phases)

@@ -230,7 +230,7 @@ class Linearised:
         if contact and path.endswith(".compliance"):
             stiffness = self.case.contacts[contact].stiffness
             return 0.0 if stiffness == "rigid" else 1.0 / stiffness
-        if "." not in path:
+        if "." not in path and path not in self.case.parameters:
             known = ("mu", "the path of one such as materials.steel.density")
             raise CaseError(path, None, f"no such number{choice(path, known, 'a number is')}")
         if split_path(path)[0] in SETTINGS:

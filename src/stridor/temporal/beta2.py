@@ -70,8 +70,12 @@ class StepLimit:
         40 % too high, and flutter between them is missed. Where no frequency tells how far somebody looks, few freedoms
         are all meant.
         """
-        bare = not system.lines and all(set(solid.cells) == {"vertex"} for solid in system.solids)
-        return replace(self, bare=system.size if bare else None)
+        return replace(self, bare=system.size if is_bare(system) else None)
+
+
+def is_bare(system: System) -> bool:
+    """Whether a system is of masses, springs and matrices alone, without a mesh."""
+    return not system.lines and all(set(solid.cells) == {"vertex"} for solid in system.solids)
 
 
 def step_limit(system: System, beta2: float) -> StepLimit:

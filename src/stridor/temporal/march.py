@@ -54,7 +54,7 @@ class March:
     def _told(self) -> tuple[str, ...]:
         """What to say of the step and of the records."""
         step = self.stepper.scheme.step
-        said = coarse(step, self.settings, self.stepper.path), unresolved(step, self.settings)
+        said = coarse(step, self.settings, self.stepper.path, self.stepper.system), unresolved(step, self.settings)
         return tuple(filter(None, said))
 
     def run(self, progress: Progress | None, checkpoint: Checkpoint | None, every_seconds: float) -> Trajectory:

@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import CaseError
 from ..system import System
 from .beta2 import StepLimit
+from .highest import highest_hz
 
 # Explicit steps to a period: central differences shift a frequency by (2π/n)²/24 of it, damping on the older velocity
 # by δΔt/4, and what modes are shifted by against each other is to be small beside what makes them flutter.
@@ -54,11 +55,13 @@ def unresolved(step: float, settings: Settings) -> str:
     return f"records every {between:.3g} s do not resolve {highest:g} Hz; {mend}"
 
 
-def coarse(step: float, settings: Settings, path: str) -> str:
+def coarse(step: float, settings: Settings, path: str, system: System | None = None) -> str:
     """What to say of explicit steps [s] on a path that are few to the period of the highest frequency asked for, "" of
-    those that are enough."""
+    those that are enough, or are for all modes that the system (that of the time loop) can have, where it is given."""
     highest = settings.max_frequency_hz
     if highest is None or path in ("exact", "implicit") or step * highest * FEWEST <= 1.0:
+        return ""
+    if system is not None and step * highest_hz(system) * FEWEST <= 1.0:
         return ""
     return (
         f"steps of {step:.3g} s are {1.0 / (step * highest):.2g} to the period of modal.max_frequency_hz = {highest:g} "

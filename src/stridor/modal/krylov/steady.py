@@ -20,6 +20,7 @@ from ...sliding import (
     require_pressed,
     steady_nodes,
     steady_sliding,
+    unstressed,
 )
 from ...sliding.motions import placed
 from ...sliding.solution import STILL
@@ -193,6 +194,8 @@ class Steadiness:
 
         d = N dμ/d|v| is of each node's own law, scaled to the coefficient that the node has: the share of μ is in it.
         """
+        if unstressed(self.system):
+            return None, None, None
         try:
             steady = self._steady(mu)
         except AnalysisError as error:
@@ -260,7 +263,8 @@ def steadiness(
 ) -> Steadiness:
     """What of the steady state matters here, beside the contact rows of the problem.
 
-    Raises AnalysisError where something does but no load presses the bodies.
+    Raises AnalysisError where something does but no load presses the bodies. Without contacts stresses are known where
+    there is no load, too.
     """
     speeds = np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1)
     pairs = {(int(nodes.owner[k]), float(speeds[k])) for k in touching}
@@ -269,7 +273,7 @@ def steadiness(
     prestress = options.prestress and system.stress_stiffness is not None
     system = system.in_place()
     hardens = bool(np.any(nodes.cubic[touching] > 0))
-    if (sloped or across or prestress or hardens) and not anything_acts(system):
+    if (sloped or across or (prestress and nodes.count) or hardens) and not anything_acts(system):
         what = (
             "a friction law with a slope" if sloped
             else "friction damping" if across

@@ -19,10 +19,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...case.usual import MOST_FRICTION, TOO_MUCH
+from ...contact.nodes import ContactNodes
 from ...errors import CaseError, NotReducibleError
 from ...system import System
 from ...typing import BoolArray, IntArray, Sparse
-from ..krylov.steady import contact_rows, refuse_stick, steadiness, touching_nodes
+from ..krylov.steady import Steadiness, contact_rows, refuse_stick, steadiness, touching_nodes
 from ..options import Options
 from .contacts_determined import refuse_undetermined_in
 from .contacts_rigid import Elimination, eliminate
@@ -115,7 +116,7 @@ def contacts_problem(
         family = replace(given, system_at=sliding_at)
     nodes = family.own.contact_nodes()
     if not nodes.count:
-        return ContactsProblem(interpolated_terms(family.structure_at, family.interpolated), family.parameters)
+        return _without_contacts(family, nodes, options)
     refuse_stick(family.own, "reduced models over parameters")
     if nodes.kept.any():
         raise NotReducibleError(
@@ -132,13 +133,7 @@ def contacts_problem(
         )  # fmt: skip
     layer = contact_rows(nodes, touching, steady.sense, steady.stuck)
     effects = steadiness(family.own, nodes, touching, options, layer)
-    if effects.stretches:
-        lacks = "springs whose stiffness depends on how far steady sliding stretches them (springs.NAME.cubic)"
-        raise NotReducibleError(
-            "reduced models over parameters: springs are taken as linear, and springs.NAME.cubic makes their stiffness "
-            "depend on how far steady sliding stretches them; `stridor modes`, `onsets` over μ and `simulate` take "
-            "that", lacks,
-        )  # fmt: skip
+    _refuse_stretched(effects)
     names = [p.name for p in family.parameters]
     rigid = nodes.compliance[touching] == 0.0
     if STIFFNESS in names and bool(rigid.all()):
@@ -168,6 +163,32 @@ def contacts_problem(
         refuse_undetermined_in(terms, family.parameters, (normal, slide), friction, own, options.solver)
         terms = elimination.applied(terms)
     return ContactsProblem(terms, family.parameters, elimination, notes, notes, steady.active)
+
+
+def _without_contacts(family: ParametricSystems, nodes: ContactNodes, options: Options) -> ContactsProblem:
+    """The problem of a structure on its own: loads still stress it."""
+    nobody = np.zeros(0, dtype=np.int64)
+    none = np.zeros(nodes.count, dtype=bool)
+    layer = contact_rows(nodes, nobody, np.zeros((nodes.count, nodes.directions)), none)
+    effects = steadiness(family.own, nodes, nobody, options, layer)
+    _refuse_stretched(effects)
+    terms, notes = interpolated_terms(family.structure_at, family.interpolated), tuple[str, ...]()
+    if not effects.neutral:
+        refuse_stick(family.own, "reduced models over parameters")
+        more, notes = steady_terms(family.system_at, family.parameters, nobody, effects)
+        terms = (*terms, *more)
+    return ContactsProblem(terms, family.parameters, None, notes, notes)
+
+
+def _refuse_stretched(effects: Steadiness) -> None:
+    """Raise NotReducibleError where what the steady state stretches springs by changes their stiffness."""
+    if effects.stretches:
+        lacks = "springs whose stiffness depends on how far steady sliding stretches them (springs.NAME.cubic)"
+        raise NotReducibleError(
+            "reduced models over parameters: springs are taken as linear, and springs.NAME.cubic makes their stiffness "
+            "depend on how far steady sliding stretches them; `stridor modes`, `onsets` over μ and `simulate` take "
+            "that", lacks,
+        )  # fmt: skip
 
 
 def deviates(family: ParametricSystems, touching: IntArray, values: Values) -> float:

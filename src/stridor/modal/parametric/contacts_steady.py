@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from ...contact.nodes import ContactNodes
 from ...direct import SingularMatrix
 from ...errors import AnalysisError
-from ...sliding import full_motion
+from ...sliding import full_motion, unstressed
 from ...sliding.solution import STILL
 from ...system import System
 from ...typing import Array, IntArray, Sparse
@@ -176,6 +176,8 @@ class _States:
 
     def _equilibrium(self, values: Values) -> tuple[Array, Array]:
         system, effects, touching = self._system_at(values), self._effects, self._touching
+        if unstressed(system):
+            return np.zeros(0), np.zeros(system.size)
         contacts = contacts_of(system, touching)
         nodes = contacts.nodes
         mu = values[FRICTION] * nodes.share if FRICTION in values else contacts.coefficient
