@@ -69,7 +69,10 @@ def test_it_is_made_once_and_the_stiffness_moves_on_it(answered: Callable[[PageS
     moved = STATE.with_change(STIFF, 3e9)
     again = answered(replace(moved, mu=0.25))
     assert not any(part == "progress" for part, _ in again)
-    assert again[0][0] == "at"  # the modes come first, the curves when nothing moves
+    # A few points of the curves come first and the modes, all points when nothing moves.
+    assert [part for part, _ in again if part in ("locus", "at", "idle")] == ["locus", "at", "at", "idle", "locus", "at"]
+    assert "being estimated" in again[0][1]["said"]
+    assert all("estimated error of λ ≤" in [c for p, c in again if p == part][-1]["said"] for part in ("locus", "at"))
     case = moved.case()
     at = [content for part, content in again if part == "at"][-1]
     modes = st.modes(case, mu=0.25, max_frequency_hz=40e3, check=False)
@@ -135,8 +138,8 @@ def test_the_first_curves_are_quick_and_say_how_near_they_are():
         assert few.branch.tolist() == every.branch.tolist()
         wanted = every.eigenvalues[rows]
         off = np.nanmax(np.abs(few.eigenvalues - wanted) / np.abs(wanted))
-        assert exact < 1e-7 < off < 1e-4  # another model, not seen in a picture
-        assert off <= 3 * told
+        assert exact() < 1e-7 < off < 1e-4  # another model, not seen in a picture
+        assert off <= 3 * told()
 
 
 def test_sensitivities_are_those_of_the_full_model_once_they_are_asked_for(

@@ -163,21 +163,26 @@ class Bench:
             send("tornado", tornado(work, state.mu, state.branch))
 
     def _answer_reduced(self, state: PageState, model: _Model, reduced: Reduced, send: Send) -> None:
-        """On a reduced model: first the modes at the μ of the page, then the curves."""
+        """On a reduced model: first a few points of the curves, where their numbers are known, and the modes at the μ
+        of the page; then all points."""
+        sweep, few_error = reduced.sweep(state), float
+        if model.locus is None and reduced.swept:
+            few, few_error = next(sweep)
+            send("locus", {**locus_of(few), "said": _uncertified(reduced)})
         here, error_of = reduced.here(state, vectors=state.branch is not None)
         at = modes_at(here, state.mu, checked=False)
-        send("at", {**at, "said": f"{reduced.words}; the error of λ is being estimated."})
+        send("at", {**at, "said": _uncertified(reduced)})
         branch, whole = state.branch, reduced.work.system()
         offered = branch is not None and self._shape(model, whole, here, branch, send, energy=False)
         if offered:
             send("tornado", _asked_for(state, reduced.seconds))
-        send("at", {**at, "said": _certified(reduced, error_of())})
+        send("at", {**at, "said": _certified(reduced, max(error_of(), few_error()))})
         self._leisure = True
         send(IDLE, None)
         if model.locus is None:
             found = model.locus
-            for found, error in reduced.sweep(state):
-                send("locus", {**locus_of(found), "said": _certified(reduced, error)})
+            for found, sweep_error in sweep:
+                send("locus", {**locus_of(found), "said": _certified(reduced, sweep_error())})
             reduced.prepare()
             model.locus = found  # of all points: what is given up halfway is drawn anew
             send("model", _described(model))
@@ -245,6 +250,10 @@ def _built(model: _Model) -> System:
 def _asked_for(state: PageState, seconds: float) -> dict[str, Any]:
     """In place of sensitivities that take a while: about how long [s], for whoever wants them all the same."""
     return {"branch": state.branch, "mu": state.mu, "bars": [], "warnings": [], "seconds": seconds}
+
+
+def _uncertified(reduced: Reduced) -> str:
+    return f"{reduced.words}; the error of λ is being estimated."
 
 
 def _certified(reduced: Reduced, error: float) -> str:

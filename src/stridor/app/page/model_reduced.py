@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from ...modal.complex_modes import ComplexModes
 from ...modal.full import ParametricOnset, ParametricOnsets, onsets_along
 from ...modal.parametric import ReducedModel
 from ...modal.parametric.contacts import ContactsProblem
-from ...modal.parametric.line import Numbered, numbers_at
+from ...modal.parametric.line import Numbered, matched_numbers, numbers_at
 from ...modal.parametric.model import ReducedModes
 from ...modal.parametric.restricted import Restricted
 from ...stages import heard
@@ -31,6 +32,7 @@ REACH = (0.1, 10.0)  # times the contact stiffness of the case
 POINTS = 21  # of the curves
 COARSE = 4  # every so many of them are drawn first
 QUICK = 1e-3  # share of directions left out of what the first ones are drawn from: λ to some 1e-5 there
+SAME = 1e-3  # of λ: how near modes at one point are to those of the model that draws first
 QUICK_POINTS = 5  # of either number, whose modes these directions are of
 
 Tell = Callable[[str], None]
@@ -75,6 +77,7 @@ class Reduced:
     seconds: float = 0.0  # about, of sensitivities in the full problem
     quick: Restricted | None = None
     _numbered: list[Numbered] = field(default_factory=list[Numbered])
+    _swept: bool = False
     _line: _Line | None = None
 
     @staticmethod
@@ -113,42 +116,61 @@ class Reduced:
         found = self.model.modes(point, judged=False) if on_line is None else on_line[0]
         numbers = self._numbers(found, state) if on_line is None else on_line[1]
         made = self._modes([found], [numbers], vectors=vectors)
-        return made, lambda: float(self.model.judged(found).error.max(initial=0.0))
+        return made, partial(self._error, [found], judged=False)
 
-    def sweep(self, state: PageState) -> Iterator[tuple[ComplexModes, float]]:
-        """Branches over the range of μ and at the μ of a state, and the largest estimated error: of few points first,
-        then of all. Numbers of the first may differ from those of the second, which follow in smaller steps."""
+    @property
+    def swept(self) -> bool:
+        """Whether numbers are known all over the range of μ, from a sweep before, and curves are drawn from few points
+        first."""
+        return self._swept and self.quick is not None
+
+    def sweep(self, state: PageState) -> Iterator[tuple[ComplexModes, Callable[[], float]]]:
+        """Branches over the range of μ and at the μ of a state, and what estimates the largest error: of few points
+        first, then of all. Numbers of the first may differ from those of the second, which follow in smaller steps."""
         low, high = friction_range(self.work.case("the page"))
         line = np.linspace(low, high, POINTS)
         own = [state.mu] if low <= state.mu <= high else []
-        passes = (np.unique(np.append(line[::COARSE], own)), np.unique(np.append(line, own)))
-        known: dict[float, ReducedModes] = {}
-        for mus in passes:
-            quick = self.quick if mus is passes[0] else None
-            model = self.model if quick is None else quick.model
-            found = known if quick is None else dict[float, ReducedModes]()
-            for mu in np.append(0.0, mus).tolist():
-                if mu not in found:
-                    found[mu] = model.modes(self._point(replace(state, mu=mu)), judged=quick is None)
+        few, every = (np.unique([0.0, *part.tolist(), *own]) for part in (line[::COARSE], line))
+        model, quick = self.model, self.quick
+        if quick is not None:
+            model = quick.model
+            found = {mu: model.modes(self._point(replace(state, mu=mu)), judged=False) for mu in few.tolist()}
+            before = [Numbered(model, quick.inside(one.modes), one.numbers) for one in self._numbered]
             # The first ones take their numbers straight from those of the sweep before: no steps over friction.
-            before = self._numbered if quick is not None and len(self._numbered) >= POINTS else []
-            if quick is not None:
-                before = [Numbered(model, quick.inside(one.modes), one.numbers) for one in before]
-            self._numbered = before
-            numbered: list[Numbered] = []
-            for mu in sorted(found):
-                numbered.append(Numbered(model, found[mu], self._numbers(found[mu], state)))
-                if not before:
-                    self._numbered = numbered
-            self._numbered = numbered
-            if quick is not None:
-                self._numbered = [
-                    Numbered(self.model, self.model.judged(quick.outside(one.modes)), one.numbers)
-                    for one in self._numbered
-                ]
-            drawn = [one for one in self._numbered if one.modes.point[FRICTION] in mus]
-            rows, numbers = [one.modes for one in drawn], [one.numbers for one in drawn]
-            yield self._modes(rows, numbers), max(float(r.error.max(initial=0.0)) for r in rows)
+            numbered = self._straight(found, before) if self._swept else self._followed(model, found)
+            self._numbered = [Numbered(self.model, quick.outside(one.modes), one.numbers) for one in numbered]
+            self._swept = True
+            yield self._drawn(low, judged=False)
+        found = {}
+        for mus in (few, every) if quick is None else (every,):
+            missing = [mu for mu in mus.tolist() if mu not in found]
+            found |= {mu: self.model.modes(self._point(replace(state, mu=mu))) for mu in missing}
+            # What is given up halfway leaves the numbers that are known.
+            self._numbered = self._followed(self.model, found)
+            self._swept = True
+            yield self._drawn(low, judged=True)
+
+    def _straight(self, found: Mapping[float, ReducedModes], before: Sequence[Numbered]) -> list[Numbered]:
+        """Modes by μ with numbers from the nearest of the points before."""
+        return [Numbered(before[0].model, modes, self._from(before, modes)) for modes in found.values()]
+
+    def _followed(self, model: ReducedModel, found: Mapping[float, ReducedModes]) -> list[Numbered]:
+        """Modes by μ with numbers by frequency at μ = 0, each from the nearest of the points below it."""
+        numbered: list[Numbered] = []
+        for mu in sorted(found):
+            numbered.append(Numbered(model, found[mu], self._from(numbered, found[mu])))
+        return numbered
+
+    def _drawn(self, low: float, *, judged: bool) -> tuple[ComplexModes, Callable[[], float]]:
+        """The points that are known from the low end of the range on, with what estimates their error."""
+        drawn = [one for one in self._numbered if one.modes.point[FRICTION] >= low]
+        rows, numbers = [one.modes for one in drawn], [one.numbers for one in drawn]
+        return self._modes(rows, numbers), partial(self._error, rows, judged=judged)
+
+    def _error(self, rows: Sequence[ReducedModes], *, judged: bool) -> float:
+        """The largest estimated error of λ at some points."""
+        known = rows if judged else [self.model.judged(row) for row in rows]
+        return max(float(row.error.max(initial=0.0)) for row in known)
 
     def prepare(self) -> None:
         """For moves of μ alone after a sweep: what its modes span answers them in a third of the time."""
@@ -182,16 +204,23 @@ class Reduced:
 
     def _numbers(self, found: ReducedModes, state: PageState) -> IntArray:
         """Numbers (k,) by frequency at μ = 0, followed to a point; 0 where that is not known."""
-        at = found.point[FRICTION]
-        if at == 0.0:
+        if not self._numbered and found.point[FRICTION] != 0.0:
+            start = self.model.modes(self._point(replace(state, mu=0.0)))
+            self._numbered = [Numbered(self.model, start, self._from((), start))]
+        return self._from(self._numbered, found)
+
+    def _from(self, known: Sequence[Numbered], found: ReducedModes) -> IntArray:
+        """The same, from the nearest of the points where they are known; at μ = 0 they are counted."""
+        if found.point[FRICTION] == 0.0:
             upper = np.flatnonzero(found.values.imag >= 0)
             numbers = np.zeros(len(found.values), dtype=np.int64)
             numbers[upper[np.argsort(found.values[upper].imag, kind="stable")]] = np.arange(1, len(upper) + 1)
             return numbers
-        if not self._numbered:
-            start = self.model.modes(self._point(replace(state, mu=0.0)))
-            self._numbered = [Numbered(self.model, start, self._numbers(start, state))]
-        nearest = min(self._numbered, key=lambda k: self._apart(k.modes.point, found.point))
+        nearest = min(known, key=lambda k: self._apart(k.modes.point, found.point))
+        if nearest.modes.point == found.point:  # of a coarser model
+            same = matched_numbers(nearest.modes.values, nearest.numbers, found.values, SAME)
+            if np.all(same[found.values.imag >= 0]):
+                return same
         return numbers_at(nearest, found)
 
     def _apart(self, one: Mapping[str, float], other: Mapping[str, float]) -> float:
