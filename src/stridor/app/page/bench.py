@@ -142,8 +142,7 @@ class Bench:
         if state.branch is not None:
             here = here or _modes_here(work, state.mu)
             self._shape(model, work.system(state.mu), here, state.branch, send, energy=True)
-        self._leisure = True
-        send(IDLE, None)
+        self._idle(send)
         model.idle = model.idle or Unsaved(work.case("the page"))
         self._at_leisure(state, model, model.idle, send)
 
@@ -169,6 +168,9 @@ class Bench:
         if model.locus is None and reduced.swept:
             few, few_error = next(sweep)
             send("locus", {**locus_of(few), "said": _uncertified(reduced)})
+            if state.mu in few.mu:  # as the curves have them, to some 1e-5, until the slider stands still
+                send("at", {**modes_at(few, state.mu, checked=False), "said": _uncertified(reduced)})
+                self._idle(send)
         here, error_of = reduced.here(state, vectors=state.branch is not None)
         at = modes_at(here, state.mu, checked=False)
         send("at", {**at, "said": _uncertified(reduced)})
@@ -177,8 +179,7 @@ class Bench:
         if offered:
             send("tornado", _asked_for(state, reduced.seconds))
         send("at", {**at, "said": _certified(reduced, max(error_of(), few_error()))})
-        self._leisure = True
-        send(IDLE, None)
+        self._idle(send)
         if model.locus is None:
             found = model.locus
             for found, sweep_error in sweep:
@@ -195,6 +196,12 @@ class Bench:
             found = self._shape(model, model.idle.system(), here, state.branch, send, energy=True)
             if found and not offered:  # its number was not known before the curves were
                 send("tornado", _asked_for(state, reduced.seconds))
+
+    def _idle(self, send: Send) -> None:
+        """From now on a newer question stops what is being answered."""
+        if not self._leisure:
+            self._leisure = True
+            send(IDLE, None)
 
     def _swept(self, work: Workspace, mu: float, send: Send) -> ComplexModes:
         """Branches over the range of μ and at the μ of the page."""
