@@ -20,6 +20,7 @@ EDGE = 1.2  # times the band: modes up to here are carried along, as damping may
 # away half of HIDDEN is what it may do to their frequency
 WATCHED = 1.1  # times the band: and up to here they must settle
 ANSWERS = 6
+RECOMBINED = 3  # times that modes mixed by damping are combined anew, with the others' answers between
 REAL = 1e-3  # of the band: λ with less of an imaginary part may be real
 FEW = 20  # modes that others' answers leave unsettled, solved for one by one
 OFF = 1e-10  # of λ: how far beside it is factorised, so that the matrix is not singular
@@ -73,7 +74,9 @@ def _with_damping(
     rough = _Rough(matrices, among, lam, among.right.weights(z, mine), among.left.weights(w, mine), top)
     rough.answering[far] = True
     unsettled = rough.begun()
-    if len(unsettled) and rough.recombined(unsettled):
+    for _ in range(RECOMBINED):
+        if not len(unsettled) or not rough.recombined(unsettled):
+            break
         unsettled = rough.answered(unsettled)
     moved = (np.abs(lam) <= WATCHED * top) & (np.abs(lam - first) >= MOVED * _apart(first))
     if len(unsettled) > FEW or moved.any() or not rough.iterated(unsettled):
