@@ -262,7 +262,7 @@ def test_a_body_that_moves_a_million_times_its_size_is_loose(monkeypatch, size: 
     # A bar of 3 m far from the origin: its extent counts, not where it is.
     bar = SimpleNamespace(points=np.array([[50.0, 10.0], [53.0, 10.5]]))
     system, force = SimpleNamespace(lines=(), solids=(bar,), stiffness=sp.eye_array(2, format="csr")), np.zeros(2)
-    monkeypatch.setattr(solution, "_loose", lambda *given: "it is loose")
+    monkeypatch.setattr(solution, "_loose", lambda *given, far: "it is loose")
     state = NodeEquilibrium(np.zeros(0, dtype=bool), np.array([0.0, -size]), np.zeros(0), np.zeros(0))
     if held:
         solution._require_held(system, None, state, 1e-9, force)

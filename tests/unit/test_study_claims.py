@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,9 @@ import pytest
 import xarray as xr
 
 import stridor as st
+from mode_coupling import mode_coupling
 from program import stridor
+from stridor.app.conclusions import of_onsets
 from stridor.case import template_text
 from stridor.studies.effect import without_effect
 from stridor.studies.reduced_rows import FrictionModels
@@ -158,3 +161,30 @@ def test_onsets_of_a_model_that_holds_its_contact_nodes_are_headed_so(capsys: py
         show_onsets_along(found, confirmed=True, held=held)
         title = " ".join(capsys.readouterr().out.split())
         assert ("confirmed in the full model, with the nodes held that touch at the case's own friction" in title) == held
+
+
+@pytest.mark.parametrize(("estimate", "off", "confirmed"), [(1e-9, 1e-12, 1), (1e-9, 1e-6, 2), (1.6e18, 1e-12, 0)])
+def test_where_an_estimate_allows_for_anything_there_is_nothing_to_confirm(
+    estimate: float, off: float, confirmed: int
+) -> None:
+    lam = 100.0j * np.array([1.0, 2.0])
+
+    def row(values: np.ndarray) -> dict[str, object]:
+        return {
+            "status": 1, "growth_rate": values.real, "frequency_hz": values.imag / (2 * np.pi),
+            "branch": np.array([1, 2]), "modes_of_band": 2, "estimated_error": estimate,
+        }  # fmt: skip
+
+    told = FrictionModels((), "modes", {}).confirmed(row(lam * (1 + off)), row(lam))
+    assert told["confirmed"] == confirmed
+    assert told["difference"] == pytest.approx(off, rel=1e-3)
+
+
+def test_the_last_line_of_onsets_says_whether_their_list_is_complete() -> None:
+    found = st.onsets(mode_coupling(0.02))
+    assert len(found) == 1
+    assert found.complete
+    last = of_onsets(found).sentence
+    assert "growth begins at" in last
+    assert not last.endswith("see above")
+    assert of_onsets(replace(found, completeness="Not complete: one more mode grows")).sentence == f"{last}, but see above"

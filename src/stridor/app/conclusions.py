@@ -79,13 +79,13 @@ def of_onsets(result: Onsets) -> Conclusion:
     over += f", of {ALIKE}" if is_of_alike(result.completeness) else ""
     if result.at_start_words:
         return Conclusion(f"unstable from the start of the range, μ = {low:g}", "modes", ("--mu", f"{low:g}"))
-    first = result.first
+    first, seen = result.first, "" if result.complete else ", but see above"
     if first is None:
         ends = len(result)
         what = "no onset" if not ends else f"growth only ends, {counted(ends, 'time')},"
-        return Conclusion(f"{what} {over}" + ("" if result.complete else ", but see above"), "modes")
+        return Conclusion(f"{what} {over}{seen}", "modes")
     count = f"{len(result.onsets)} onsets" if len(result.onsets) > 1 else "1 onset"
-    said = f"{count} {over}; growth begins at μ = {fixed(first.mu, 6)}, {readable(first.frequency_hz)} Hz"
+    said = f"{count} {over}; growth begins at μ = {fixed(first.mu, 6)}, {readable(first.frequency_hz)} Hz{seen}"
     return Conclusion(said, "modes", ("--mu", f"{min(BEYOND * first.mu, high):.3g}"))
 
 

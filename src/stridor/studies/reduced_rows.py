@@ -34,6 +34,7 @@ from .tables import OF_ONSETS, ROUNDING, SAME, Compute, Keep
 
 SAFE = 100.0  # how many times its estimated error a growth rate must be to have a sign
 NEAR = 1e-6  # growth, of |λ|, below which stability is decided in full however small the error
+EMPTY = 1.0  # estimated error, relative, above which nothing is said of a row
 SLOW = 0.01  # of the largest |λ|: below it differences are taken against that
 WORTH = 50  # rows from which on a model is worth making
 MOST_STRETCHES = 4  # of friction, each with a model of its own
@@ -112,7 +113,9 @@ class FrictionModels:
         if self.compute == "onsets":
             allowed = max(allowed, OF_ONSETS)
         agrees = off <= allowed and _same_counts(row, full, self.compute)
-        told = {"estimated_error": row["estimated_error"], "difference": off, "confirmed": 1 if agrees else 2}
+        # Of an estimate that allows for anything there is nothing to confirm.
+        confirmed = 0 if not float(row["estimated_error"]) <= EMPTY else 1 if agrees else 2
+        told = {"estimated_error": row["estimated_error"], "difference": off, "confirmed": confirmed}
         if self.compute == "modes":
             # One numbering throughout: that of the branches of the models.
             near = max(allowed, ROUNDING)

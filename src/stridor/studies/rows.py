@@ -219,7 +219,8 @@ _COMMON = (
 _ESTIMATED = (
     StoreColumn("estimated_error", "f8", "1", "estimated relative error of the eigenvalues; none where solved in full"),
     StoreColumn(
-        "confirmed", "i1", "", "1 where the row was solved in full as well and both agree, 2 where they do not"
+        "confirmed", "i1", "", "1 where the row was solved in full as well and both agree, 2 where they do not; "
+        "0 where it was not, or where the estimated error is above 1 and allows for anything",
     ),
     StoreColumn("difference", "f8", "1", "relative difference of both where solved in full as well"),
 )

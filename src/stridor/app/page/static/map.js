@@ -104,7 +104,7 @@ const stridorMap = (() => {
     const nx = named(page.asked.x), ny = named(page.asked.y), image = m.xs.length ? shading(m) : null, [x0, x1] = page.asked.x_range, [y0, y1] = page.asked.y_range;
     const half = (v) => (v.length > 1 ? (v[1] - v[0]) / 2 : 0), hues = [...new Set(m.curves.map((k) => Math.round(k.frequency_hz)))].sort((a, b) => a - b);
     const hue = (f) => (dark() ? NIGHT : RAMP)[hues.length < 2 ? 2 : Math.round((4 * hues.indexOf(Math.round(f))) / (hues.length - 1))];
-    const words = (k) => (k.kind === "divergence" ? "divergence, 0 Hz" : `${(k.frequency_hz / 1e3).toPrecision(3)} kHz`), l = { color: text(), fontSize: 11 };
+    const words = (k) => (k.kind === "divergence" ? "divergence, 0 Hz" : k.frequency_hz < 1e3 ? `${k.frequency_hz.toPrecision(3)} Hz` : `${(k.frequency_hz / 1e3).toPrecision(3)} kHz`), l = { color: text(), fontSize: 11 };
     c.setOption({ animation: false, backgroundColor: "transparent",
       grid: { left: 90, right: 24, top: 40, bottom: 48, outerBoundsMode: "none" },
       legend: { top: 4, icon: "rect", itemHeight: 4, textStyle: l, selectedMode: false, data: [...new Set(m.curves.map(words)), ...(points(true).length ? ["sample: grows"] : []), ...(points(false).length ? ["sample: nothing grows"] : [])] },

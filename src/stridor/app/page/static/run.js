@@ -14,20 +14,27 @@ const stridorRun = (() => {
     return {
       animation: false, backgroundColor: "transparent",
       grid: { left: 58, right: 12, top: 28, bottom: bottom ? 32 : 8, outerBoundsMode: "none" },
-      xAxis: { type: "value", min: least, max: most, name: bottom ? "time [ms]" : "", nameLocation: "middle", nameGap: 18, nameTextStyle: label,
+      xAxis: { type: "value", min: least, max: most, name: bottom ? `time [${clock()[1]}]` : "", nameLocation: "middle", nameGap: 18, nameTextStyle: label,
         axisLabel: { ...label, show: bottom, hideOverlap: true }, axisLine: { onZero: false, lineStyle: { color: rule() } }, splitLine: { lineStyle: { color: grid() } } },
       yAxis: { type: "value", scale: true, name: unit, nameLocation: "end", nameGap: 12, nameTextStyle: { ...label, align: "left", padding: [0, 0, 0, -52] }, splitNumber: 3,
         axisLabel: { ...label, formatter: shown }, axisLine: { show: true, onZero: false, lineStyle: { color: rule() } }, splitLine: { lineStyle: { color: grid() } } },
     };
   }
   const span = () => {
-    const p = page.picture, first = p.phases.length ? p.phases[0][1] : p.time[0];
-    return [1e3 * first, Math.max(1e3 * p.end, 1e3 * first + 1e-6)];
+    const first = began(page.picture), [factor] = clock();
+    return [factor * first, Math.max(factor * page.picture.end, factor * first + 1e-6)];
   };
-  const ms = (p) => p.time.map((t) => 1e3 * t);
+  const began = (p) => (p.phases.length ? p.phases[0][1] : p.time[0]);
+  // The factor and the unit of times, as the whole run will need them: they are not to change while it grows.
+  function clock() {
+    const p = page.picture, whole = ((p.end - began(p)) * p.planned) / Math.max(p.done, 1);
+    return whole >= 1 ? [1, "s"] : [1e3, "ms"];
+  }
+  const times = (p) => p.time.map((t) => clock()[0] * t);
+  const lasting = (seconds) => (seconds >= 1 ? [seconds, "s"] : [1e3 * seconds, "ms"]);
   // A band from the least to the largest value of each stretch: one closed line, filled.
   function band(id, name, b, colour) {
-    const t = ms(page.picture), outline = [...t.map((x, k) => [x, b.high[k]]), ...t.map((x, k) => [x, b.low[k]]).reverse()];
+    const t = times(page.picture), outline = [...t.map((x, k) => [x, b.high[k]]), ...t.map((x, k) => [x, b.low[k]]).reverse()];
     return { id, name, type: "custom", silent: true, clip: true, itemStyle: { color: colour }, data: [0], encode: { x: -1, y: -1 },
       renderItem: (_, api) => ({ type: "polygon", shape: { points: outline.map((p) => api.coord(p)) }, style: { fill: colour, stroke: colour, lineWidth: 1, opacity: 0.9 } }) };
   }
@@ -52,7 +59,7 @@ const stridorRun = (() => {
     const p = page.picture;
     if (!p || !p.time.length) return;
     document.querySelectorAll(".st-run-chart").forEach((e) => { e.hidden = false; });
-    const until = `up to ${shown(1e3 * p.end)} ms`;
+    const [factor, unit] = clock(), until = `up to ${shown(factor * p.end)} ${unit}`;
     if (p.acceleration) {
       const a = p.acceleration, o = axes(false, "m/s²"), r = scale([a]);
       put("acceleration", { ...o, title: title(`acceleration of ${a.label}`), yAxis: { ...o.yAxis, ...round(r) }, series: [band("a", a.label, a, clear(page.colours.normal, "#5CB3E6"))] },
@@ -70,15 +77,15 @@ const stridorRun = (() => {
   }
   const phases = (p) => ({ silent: true, symbol: "none", animation: false, lineStyle: { color: rule(), type: "dotted" },
     label: { position: "insideEndTop", rotate: 0, fontSize: 10, color: text(), formatter: (d) => d.name, align: "left", offset: [9, 14] },
-    data: p.phases.map(([name, start], k) => ({ name: room(p, k) ? name : "", xAxis: 1e3 * start })) });
+    data: p.phases.map(([name, start], k) => ({ name: room(p, k) ? name : "", xAxis: clock()[0] * start })) });
   // Whether the name of a phase has room before the next one begins.
   const room = (p, k) => {
-    const [least, most] = span(), end = k + 1 < p.phases.length ? 1e3 * p.phases[k + 1][1] : most;
-    return (end - 1e3 * p.phases[k][1]) / (most - least) > 0.025 * p.phases[k][0].length;
+    const [least, most] = span(), [factor] = clock(), end = k + 1 < p.phases.length ? factor * p.phases[k + 1][1] : most;
+    return (end - factor * p.phases[k][1]) / (most - least) > 0.025 * p.phases[k][0].length;
   };
   const strips = () => (dark() ? { separation: "#b8672a", stick: "#3f78a8", slip: "#8d8353" } : page.colours);
   function status(p, contact) {
-    const t = ms(p), o = axes(true, ""), names = ["separation", "stick", "slip"], shares = p.status[contact];
+    const t = times(p), o = axes(true, ""), names = ["separation", "stick", "slip"], shares = p.status[contact];
     const mean = names.map((_, k) => shares[k].reduce((a, b) => a + b, 0) / t.length);
     const colours = strips();
     put("status", { ...o, grid: { ...o.grid, top: 20, bottom: 30 }, title: title(`contact ${contact}`),
@@ -94,13 +101,13 @@ const stridorRun = (() => {
   }
   function portrait(q) {
     const o = axes(true, "m/s"), label = { color: text(), fontSize: 10 };
-    const [most, factor, unit] = length(q.displacement);
+    const [most, factor, unit] = length(q.displacement), [last, ends] = lasting(q.seconds);
     const r = { min: Math.min(...q.velocity), max: Math.max(...q.velocity) };
-    put("portrait", { ...o, title: title(`${q.label}, the last ${shown(1e3 * q.seconds)} ms`),
+    put("portrait", { ...o, title: title(`${q.label}, the last ${shown(last)} ${ends}`),
       xAxis: { ...o.xAxis, min: null, max: null, scale: true, name: `displacement about its mean [${unit}]`, axisLabel: { ...label, show: true, hideOverlap: true, formatter: shown } },
       yAxis: { ...o.yAxis, ...round(r) },
       series: [{ id: "p", type: "line", silent: true, showSymbol: false, lineStyle: { width: 0.9, color: clear(page.colours.normal, "#5CB3E6") }, data: q.displacement.map((u, k) => [factor * u, q.velocity[k]]) }] },
-      `Velocity over displacement of ${q.label} in the last ${shown(1e3 * q.seconds)} milliseconds: displacements within ${shown(factor * most)} ${unit}.`);
+      `Velocity over displacement of ${q.label} in the last ${shown(last)} ${ends}: displacements within ${shown(factor * most)} ${unit}.`);
   }
   const RAMP = [[0, 34, 78], [53, 69, 108], [102, 105, 112], [148, 142, 119], [200, 184, 102], [254, 232, 56]]; // cividis, as in the report
   function picture(s) {
@@ -116,9 +123,10 @@ const stridorRun = (() => {
     return canvas;
   }
   function sonogram(s) {
-    const o = axes(true, "kHz"), image = picture(s), t = s.time.map((x) => 1e3 * x), f = s.frequency_hz.map((x) => x / 1e3);
+    const [per, unit] = s.frequency_hz[s.frequency_hz.length - 1] < 1e3 ? [1, "Hz"] : [1e3, "kHz"];
+    const o = axes(true, unit), image = picture(s), t = s.time.map((x) => clock()[0] * x), f = s.frequency_hz.map((x) => x / per);
     const half = (v) => (v.length > 1 ? (v[1] - v[0]) / 2 : v[0] || 0.5), top = f[f.length - 1] + half(f);
-    const near = page.growing.filter((g) => g / 1e3 <= top);
+    const near = page.growing.filter((g) => g / per <= top);
     let loudest = [0, -1e9];
     s.level.forEach((column) => column.forEach((v, j) => { if (v > loudest[1]) loudest = [f[j], v]; }));
     put("sonogram", { ...o, title: title(near.length ? "spectrogram; dashed: modes that grow" : "spectrogram of the acceleration"),
@@ -128,8 +136,8 @@ const stridorRun = (() => {
           const [x0, y0] = api.coord([t[0] - half(t), f[0] - half(f)]), [x1, y1] = api.coord([t[t.length - 1] + half(t), top]);
           return { type: "image", style: { image, x: x0, y: y1, width: x1 - x0, height: y0 - y1 } };
         },
-        markLine: { silent: true, symbol: "none", animation: false, lineStyle: { color: "#fff", type: "dashed", width: 1 }, label: { show: false }, data: near.map((g) => ({ yAxis: g / 1e3 })) } }] },
-      `Short-time spectra; the loudest line lies at ${shown(loudest[0])} kHz.` + (near.length ? ` Modes that grow: ${near.map((g) => `${Math.round(g)} Hz`).join(", ")}.` : ""));
+        markLine: { silent: true, symbol: "none", animation: false, lineStyle: { color: "#fff", type: "dashed", width: 1 }, label: { show: false }, data: near.map((g) => ({ yAxis: g / per })) } }] },
+      `Short-time spectra; the loudest line lies at ${shown(loudest[0])} ${unit}.` + (near.length ? ` Modes that grow: ${near.map((g) => `${Math.round(g)} Hz`).join(", ")}.` : ""));
   }
 
   // -- the state of the run ------------------------------------------------------------------------------------------
