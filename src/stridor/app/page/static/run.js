@@ -27,7 +27,9 @@ const stridorRun = (() => {
   const began = (p) => (p.phases.length ? p.phases[0][1] : p.time[0]);
   // The factor and the unit of times, as the whole run will need them: they are not to change while it grows.
   function clock() {
-    const p = page.picture, whole = ((p.end - began(p)) * p.planned) / Math.max(p.done, 1);
+    const p = page.picture;
+    if (!p) return [1e3, "ms"]; // limit cycles are drawn with these axes where nothing has run
+    const whole = ((p.end - began(p)) * p.planned) / Math.max(p.done, 1);
     return whole >= 1 ? [1, "s"] : [1e3, "ms"];
   }
   const times = (p) => p.time.map((t) => clock()[0] * t);
