@@ -8,39 +8,11 @@ import meshio
 import numpy as np
 import pytest
 
-from solid_cases import case
+from solid_cases import bench_as_solids, case
 from stridor.system import System, build_system, supports
 from stridor.system.bodies import KnownBodies
 
-STACK = """
-[bodies.block]
-type = "solid"
-material = "steel"
-model = "plane stress"
-mesh = { shape = "rectangle", corner = [0.0, 0.0], size = [0.1, 0.02], divisions = [6, 2] }
-[bodies.layer]
-type = "solid"
-material = "rubber"
-model = "plane stress"
-mesh = { shape = "rectangle", corner = [0.0, 0.02], size = [0.1, 0.01], divisions = [9, 1] }
-[materials.steel]
-young_modulus = 2.1e11
-poisson_ratio = 0.3
-density = 7800.0
-[materials.rubber]
-young_modulus = 1.0e9
-poisson_ratio = 0.3
-density = 1200.0
-[ties.glued]
-slave = "layer.bottom"
-master = "block.top"
-[supports.ground]
-at = "block.bottom"
-fixed = ["x", "y"]
-[loads.push]
-at = "layer.top"
-pressure = 1e5
-"""
+BENCH = bench_as_solids(across=(1, 1), along=(6, 12))  # a pin tied to its guide, on a beam
 
 
 @pytest.fixture
@@ -65,17 +37,18 @@ def same(one: System, other: System) -> bool:
 @pytest.mark.parametrize(
     ("changes", "again"),
     [
-        ({"materials.rubber.young_modulus": 2e9}, 0),
-        ({"bodies.layer.damping.mass": 3.0}, 0),
-        ({"loads.push.pressure": 2e5}, 0),
-        ({"ties.glued.tolerance": 1e-3}, 1),
-        ({"supports.ground.fixed": ["y"]}, 1),
-        ({"bodies.layer.mesh.divisions": [7, 1]}, 1),
-        ({"bodies.block.mesh.divisions": [5, 2]}, 1),
+        ({"materials.stiff.young_modulus": 1e13}, 0),
+        ({"bodies.guide.damping.mass": 3.0}, 0),
+        ({"loads.press.force": [0.0, -30.0]}, 0),
+        ({"contacts.A.stiffness": 2e10}, 0),
+        ({"ties.top.tolerance": 1e-4}, 1),
+        ({"supports.side1.fixed": ["x", "y"]}, 1),
+        ({"bodies.pin.mesh.divisions": [5, 1]}, 1),
+        ({"bodies.guide.mesh.divisions": [1, 1]}, 1),
     ],
 )
 def test_ties_are_made_anew_where_something_of_theirs_differs(changes: dict, again: int, made: list[str]) -> None:
-    known, plain = KnownBodies(), case(STACK)
+    known, plain = KnownBodies(), case(BENCH)
     first = build_system(plain, known=known)
     del made[:]
     varied = build_system(plain.with_(changes), known=known)

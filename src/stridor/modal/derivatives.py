@@ -309,6 +309,7 @@ def solve_mode(pencil: Pencil, guess: complex, gap: float, *, solver: str | None
     )
 
 
+@passing()
 def solve_mode_released(
     pencil: Pencil, guess: complex, gap: float, groups: Sequence[IntArray], *, solver: str | None = None
 ) -> tuple[Mode, ComplexArray]:

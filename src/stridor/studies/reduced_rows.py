@@ -30,11 +30,10 @@ from .checks import FRICTION
 from .followed import anchors_noted, anchors_read, numbered
 from .rows import Row, modes_row, onsets_row
 from .schema import Study
-from .tables import OF_ONSETS, ROUNDING, SAME, Compute, Keep
+from .tables import EMPTY, OF_ONSETS, ROUNDING, SAME, Compute, Keep
 
 SAFE = 100.0  # how many times its estimated error a growth rate must be to have a sign
 NEAR = 1e-6  # growth, of |λ|, below which stability is decided in full however small the error
-EMPTY = 1.0  # estimated error, relative, above which nothing is said of a row
 SLOW = 0.01  # of the largest |λ|: below it differences are taken against that
 WORTH = 50  # rows from which on a model is worth making
 MOST_STRETCHES = 4  # of friction, each with a model of its own

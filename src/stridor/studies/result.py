@@ -18,7 +18,7 @@ from ..tabular import Cell, Rows, Tabular
 from ..typing import Array, BoolArray, IntArray
 from .schema import Study
 from .store import DONE, FAILED, PENDING, dataset
-from .tables import OF_ONSETS, ROUNDING, SAME
+from .tables import EMPTY, OF_ONSETS, ROUNDING, SAME
 from .uncertainty import Indices, Probability, grows, in_bands, probability, sobol_indices
 
 BANDS = 8  # of frequency, where nobody says which
@@ -224,9 +224,9 @@ class StudyResult(Tabular, Shown):
             return []
         off = np.asarray(self.data["difference"].values)[self.done]
         error = np.asarray(self.data["estimated_error"].values)[self.done]
-        # An estimate above one says nothing, and of rows that were solved in full nothing stands on it.
+        # An estimate above EMPTY says nothing, and of rows that were solved in full nothing stands on it.
         known = error[alone & np.isfinite(error)]
-        worst = f", estimated error {known.max():.1e} at most" if len(known) and known.max() <= 1.0 else ""
+        worst = f", estimated error {known.max():.1e} at most" if len(known) and known.max() <= EMPTY else ""
         lines = [f"{answered or 'no'} rows by a reduced model alone{worst}; {both} solved in full as well"]
         wrong = int(np.count_nonzero(confirmed == 2))
         if wrong:
@@ -236,7 +236,7 @@ class StudyResult(Tabular, Shown):
             )
         elif both:
             lines[0] += f", off by {np.nanmax(off):.1e} at most"
-            if not np.any(error[confirmed > 0] > 1.0):
+            if not np.any(error[confirmed > 0] > EMPTY):
                 lines[0] += f", none by more than {self._allowed}"
         return lines
 

@@ -12,6 +12,7 @@ from ..errors import Problem
 # When the full problem confirms a row of a reduced model: eigenvalues no further off than so many times the estimate,
 # or this relative difference; onsets no further than that, as μ is further off than λ where growth begins slowly.
 SAME, ROUNDING, OF_ONSETS = 10.0, 1e-9, 1e-6
+EMPTY = 1.0  # estimated error, relative, above which nothing is said of a row
 MOST_SAMPLES = 10_000_000
 
 Compute = Literal["modes", "onsets", "steady", "simulate", "compare"]

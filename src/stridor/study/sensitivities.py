@@ -373,7 +373,7 @@ class Linearised:
 
     def mode(self, column: int, groups: Sequence[IntArray] = ()) -> Mode | None:
         """A mode with its vectors; None, and a warning, where it has no derivatives. groups: of touching nodes, which
-        `released` is going to be asked of."""
+        `released` is going to be asked of, from the first time on."""
         if column not in self._solved:
             lam = complex(self.eigenvalues[column])
             name = f"mode {self.modes.branch[column]} ({measured(lam.imag / (2 * np.pi), 1)} Hz)"

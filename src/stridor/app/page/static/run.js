@@ -32,7 +32,11 @@ const stridorRun = (() => {
     const whole = ((p.end - began(p)) * p.planned) / Math.max(p.done, 1);
     return whole >= 1 ? [1, "s"] : [1e3, "ms"];
   }
-  const times = (p) => p.time.map((t) => clock()[0] * t);
+  const times = (p) => inUnit(p.time);
+  function inUnit(seconds) {
+    const [factor] = clock();
+    return seconds.map((t) => factor * t);
+  }
   const lasting = (seconds) => (seconds >= 1 ? [seconds, "s"] : [1e3 * seconds, "ms"]);
   // A band from the least to the largest value of each stretch: one closed line, filled.
   function band(id, name, b, colour) {
@@ -126,7 +130,7 @@ const stridorRun = (() => {
   }
   function sonogram(s) {
     const [per, unit] = s.frequency_hz[s.frequency_hz.length - 1] < 1e3 ? [1, "Hz"] : [1e3, "kHz"];
-    const o = axes(true, unit), image = picture(s), t = s.time.map((x) => clock()[0] * x), f = s.frequency_hz.map((x) => x / per);
+    const o = axes(true, unit), image = picture(s), t = inUnit(s.time), f = s.frequency_hz.map((x) => x / per);
     const half = (v) => (v.length > 1 ? (v[1] - v[0]) / 2 : v[0] || 0.5), top = f[f.length - 1] + half(f);
     const near = page.growing.filter((g) => g / per <= top);
     let loudest = [0, -1e9];
