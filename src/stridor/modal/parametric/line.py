@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -73,23 +72,32 @@ class ModelAlongLine(OverNumber):
         here = problem.factors(self.point(t))
         above, below = (here if at == t else problem.factors(self.point(at)) for at in (high, low))
         change = (above - below) / (high - low)
-        moved, sizes = self._sandwiched(t, modes, (change, here))
-        by_x = 2 * lam * sizes[0] + sizes[1] if self.damped else sizes[0]
+        moved, (by_mass, by_damping) = self._moved(t, modes, change), self._inert(t, modes, here)
+        by_x = 2 * lam * by_mass + by_damping if self.damped else by_mass
         with np.errstate(all="ignore"):
             slopes: ComplexArray = -(lam**2 * moved[0] + lam * moved[1] + moved[2]) / by_x
         return slopes
 
-    def _sandwiched(self, t: float, modes: ReducedModes, chosen: Sequence[Array]) -> list[ComplexArray]:
-        """Of each of these factors wᵀAz (3, k) of what the terms on each power of λ add up to, M first."""
-        powers = self.model.problem.powers
+    def _moved(self, t: float, modes: ReducedModes, change: Array) -> ComplexArray:
+        """wᵀAz (3, k) of what the terms on each power of λ change by, M first."""
         if t == 0.0:
-            shares = self._begin.shares
-            return [np.array([f[powers == p] @ shares[powers == p] for p in (2, 1, 0)]) for f in chosen]
+            return np.array([self._share(change, power) for power in (2, 1, 0)])
+        parts = images(assembled_each(self.model.projected, (change,), self.model.problem.powers)[0], modes.right)
+        return np.array([np.einsum("ij,ij->j", modes.left, part) for part in parts])
+
+    def _inert(self, t: float, modes: ReducedModes, here: Array) -> tuple[ComplexArray, ComplexArray]:
+        """wᵀMz and wᵀDz (k,)."""
+        if t == 0.0:
+            return self._share(here, 2), self._share(here, 1)
+        mass, damping, _ = self.model.matrices(here)
         left, right = modes.left, modes.right
-        return [
-            np.array([np.einsum("ij,ij->j", left, part) for part in images(parts, right)])
-            for parts in assembled_each(self.model.projected, chosen, powers)
-        ]
+        return np.einsum("ij,ij->j", left, combined(mass, right)), np.einsum("ij,ij->j", left, combined(damping, right))
+
+    def _share(self, factors: Array, power: int) -> ComplexArray:
+        """wᵀAz (k,) at the start, of what the terms on a power of λ add up to."""
+        chosen = self.model.problem.powers == power
+        made: ComplexArray = factors[chosen] @ self._begin.shares[chosen]
+        return made
 
 
 def numbers_at(start: Numbered, end: ReducedModes) -> IntArray:

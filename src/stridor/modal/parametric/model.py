@@ -176,8 +176,8 @@ class ReducedModel(Shown):
         """All modes up to the promised frequency at a point of the box. Not judged, their residual and estimated error
         are NaN until `judged` has them. Raises CaseError for unknown parameters."""
         point = self.problem.point(values)
-        factors, powers = self.problem.factors(point), self.problem.powers
-        matrices = assembled(self.projected, factors, powers)
+        factors = self.problem.factors(point)
+        matrices = self.matrices(factors)
         inside = self.problem.inside(point)
         # Outside the box nothing says that the states are those of its modes.
         found = self.states.modes(matrices, self.searched, REACH) if self.states is not None and inside else None
@@ -194,7 +194,21 @@ class ReducedModel(Shown):
     def judged(self, modes: ReducedModes) -> ReducedModes:
         """The same modes with their residual and estimated error."""
         factors = self.problem.factors(self.problem.point(modes.point))
-        return self._judged(modes, assembled(self.projected, factors, self.problem.powers), factors)
+        return self._judged(modes, self.matrices(factors), factors)
+
+    def matrices(self, factors: Array) -> tuple[Array, Array, Array]:
+        """M, D and K (r, r) on the basis with these factors (t,) of the terms; those of the last ones are at hand: what
+        follows branches to a point asks for them again. Not to be written to."""
+        for known, made in tuple(self._latest):
+            if np.array_equal(known, factors):
+                return made
+        made = assembled(self.projected, factors, self.problem.powers)
+        self._latest[:] = [(factors.copy(), made)]
+        return made
+
+    @cached_property
+    def _latest(self) -> list[tuple[Array, tuple[Array, Array, Array]]]:
+        return []
 
     def unlike(self, points: Sequence[Mapping[str, float]]) -> tuple[str, ...]:
         """`ContactsProblem.unlike`; "" of each point of problems without contacts."""
