@@ -14,6 +14,7 @@ import pytest
 import scipy.linalg as sl
 import scipy.sparse as sp
 
+from stridor.contact.obstacles import Cylinder
 from stridor.errors import AnalysisError, CaseError
 from stridor.laws import Coulomb, Tabulated, Weakening
 from stridor.laws.friction import friction_rows
@@ -29,6 +30,7 @@ from stridor.temporal.sketch import SketchPart
 from stridor.temporal.steppers.modal import ModalStepper, start
 from stridor.temporal.steppers.sparse import damping, limit, renewal, step_matrix, storage
 from stridor.temporal.steppers.sparse import machine as assembled_machine
+from stridor.temporal.steppers.sparse.bends import TURN
 from stridor.temporal.steppers.sparse.node_table import sliding_directions
 
 # What NumPy warns of is a fault here, whatever comes of it.
@@ -424,15 +426,18 @@ def test_energies_at_the_start_are_those_that_works_are_counted_from(monkeypatch
 # -- sliding far -------------------------------------------------------------------------------------------------------
 
 
-def surface(position, area=1.0, sliding="finite") -> Any:
-    return SimpleNamespace(slave_position=np.array(position, dtype=float), area=np.array([area]), sliding=sliding)
+def surface(position, area=1.0, sliding="finite", master=None) -> Any:
+    return SimpleNamespace(
+        slave_position=np.array(position, dtype=float), area=np.array([area]), sliding=sliding, master=master
+    )
 
 
 def test_nodes_are_as_far_apart_as_most_of_them() -> None:
     system: Any = SimpleNamespace(surfaces=[
         surface([[0, 0], [1, 0], [3, 0], [6, 0], [10, 0]]), surface([[1, 2]], 0.3), surface([[1, 2, 3]], 0.09),
+        surface([[1, 2]], 1.0, master=Cylinder(np.zeros(2), 0.07)),
     ])  # fmt: skip
-    assert renewal.node_distances(system) == pytest.approx([2.0, 0.3, 0.3])
+    assert renewal.node_distances(system) == pytest.approx([2.0, 0.3, 0.3, 0.07])
 
 
 def test_rows_are_renewed_before_a_node_has_slid_a_thousandth_of_their_distance() -> None:
@@ -446,12 +451,18 @@ def test_rows_are_renewed_before_a_node_has_slid_a_thousandth_of_their_distance(
         fields=SimpleNamespace(q=speeds), layout=SimpleNamespace(index=np.arange(4)),
         state=SimpleNamespace(motion=np.array([[5.0], [-4.0]])), scheme=SimpleNamespace(step=1e-4),
         system=SimpleNamespace(contacts=(1,), surfaces=[surface([[0, 0]]), surface([[0, 0]], sliding="small")]),
+        turning=SimpleNamespace(rate=np.zeros((4, 1, 1))),
     )  # fmt: skip
     steps = renewal.steps_to_renewal(machine, np.array([4.2, 1e-9]), 150)
     assert steps == int(1e-3 * 4.2 / (0.5 * 1e-4)) == 84
     assert renewal.steps_to_renewal(machine, np.array([4.2, 1.0]), 30) == 60  # twice as many as the last time
     assert renewal.steps_to_renewal(machine, np.array([42.0, 1.0]), 150) == 200
     assert renewal.steps_to_renewal(machine, np.array([1e-9, 1.0]), 150) == 1
+    # Nor has its normal turned by more than that on a curve, where an obstacle has no distance between nodes.
+    machine.turning.rate[:, 0, 0] = [99.0, 30.0, -8.0, 99.0]
+    assert renewal.steps_to_renewal(machine, np.array([42.0, 1.0]), 150) == int(TURN / (8.0 * 0.5 * 1e-4))
+    machine.system.surfaces[0].master = Cylinder(np.zeros(2), 1 / 8)
+    assert renewal.steps_to_renewal(machine, np.array([1e-9, 1.0]), 150) == int(TURN / (8.0 * 0.5 * 1e-4))
     machine.fields.q = 0 * speeds
     machine.state.motion = np.zeros((2, 1))
     assert renewal.steps_to_renewal(machine, np.array([1e-9, 1.0]), 90) == 180

@@ -21,6 +21,7 @@ from stridor.system import System
 from stridor.system.model import PrescribedMotion
 from stridor.temporal.energy import energy_balance
 from stridor.temporal.settings import Settings
+from stridor.temporal.steppers.sparse.bends import Turning
 from stridor.temporal.steppers.sparse.disc import solve_disc
 from stridor.temporal.steppers.sparse.renewal import take_over
 
@@ -300,6 +301,63 @@ def test_finite_sliding_round_a_cylinder():
     assert np.array_equal(again.displacement, result.displacement)
 
 
+def in_a_bore(radius, start, *, velocity=(0.0, 0.0, 0.0), stiffness=np.inf, mu=0.0):
+    """A point mass of 1 kg in a bore along y, rigid or with a contact stiffness [N/m]."""
+    from stridor.contact.obstacles import Cylinder
+
+    rows = Rows(sp.csr_array(np.eye(3)), np.zeros((3, 0)))
+    contact = pair_surface(
+        "bore", where="contacts.bore", slave=rows, slave_position=np.array(start)[None], area=np.ones(1),
+        slave_normals=np.zeros((1, 3)), master=Cylinder(np.zeros(3), radius, np.array([0.0, 1.0, 0.0]), inside=True),
+        master_rows=Rows(sp.csr_array((0, 3)), np.zeros((0, 0))), drift=np.zeros((1, 3, 0)), adjust=True,
+        stiffness_per_area=stiffness, law=Coulomb(mu), sliding="finite",
+    )  # fmt: skip
+    system = replace(masses(mass=1.0), surfaces=(contact,), points={"mass": rows})
+    return replace(system, initial_velocity=np.array(velocity))
+
+
+@pytest.mark.parametrize("stiffness", [np.inf, 1e6])
+def test_a_bore_pushes_back_evenly_whatever_the_step(stiffness):
+    """A pendulum in a bore is pressed with N = m (g cos θ + R θ'²) all the time. On rows that stayed between renewals
+    its normal velocity was stopped at each, by forces that grew as the step shrank, and contact parted in between."""
+    radius, angle = 0.09, 1.0
+    system = in_a_bore(radius, radius * np.array([math.sin(angle), 0.0, -math.cos(angle)]), stiffness=stiffness)
+    answer = scipy.integrate.solve_ivp(
+        lambda _, y: [y[1], -GRAVITY / radius * math.sin(y[0])], (0, 0.2), [angle, 0.0], rtol=1e-10, dense_output=True
+    ).sol
+    for step in (2e-4, 5e-5):
+        settings = Settings(step=step, record_every=4, watch=("mass",))
+        found = simulate_assembled(system, one_phase(0.2), settings)
+        theta, rate = answer(found.time)
+        true = GRAVITY * np.cos(theta) + radius * rate**2
+        settled = found.time > 0.01
+        off = np.abs(found.normal_force[settled, 0] - true[settled]).max() / true.max()
+        energy = 0.5 * (found.velocity[-1, 0] ** 2).sum() + GRAVITY * found.displacement[-1, 0, 2]
+        assert off < (0.5 if np.isfinite(stiffness) else 1e-5)  # the spring rings from the sudden start
+        assert abs(energy) < (1e-3 if np.isfinite(stiffness) else 1e-6) * GRAVITY * radius
+
+
+def test_a_helix_in_a_bore_keeps_its_speed():
+    """Along and around a bore without gravity: N = m v²/R of the part around, both parts of the velocity stay, and
+    friction slows both alike."""
+    radius, around, along = 0.2, 1.5, 2.0
+    free = replace(in_a_bore(radius, [0.0, 0.0, -radius], velocity=[around, along, 0.0]), loads={})
+    found = simulate_assembled(free, one_phase(0.1), Settings(step=2e-5, record_every=20, watch=("mass",)))
+    late = slice(5, None)
+    assert found.normal_force[late, 0] == pytest.approx(around**2 / radius, rel=1e-6)
+    position = np.array([0.0, 0.0, -radius]) + found.displacement[:, 0]
+    assert found.velocity[late, 0, 1] == pytest.approx(along, rel=1e-9)
+    assert np.hypot(position[:, 0], position[:, 2]) == pytest.approx(radius, rel=1e-6)
+    assert np.linalg.norm(found.velocity[late, 0], axis=1) == pytest.approx(math.hypot(around, along), rel=1e-6)
+    slowed = replace(in_a_bore(radius, [0.0, 0.0, -radius], velocity=[around, along, 0.0], mu=0.2), loads={})
+    found = simulate_assembled(slowed, one_phase(0.1), Settings(step=2e-5, record_every=20, watch=("mass",)))
+    answer = scipy.integrate.solve_ivp(
+        lambda _, v: -0.2 * v[0] ** 2 / radius * v / np.linalg.norm(v), (0, 0.1), [around, along], rtol=1e-10,
+        t_eval=found.time[late],
+    ).y
+    assert found.velocity[late, 0, 1] == pytest.approx(answer[1], rel=1e-4)
+
+
 def test_leaving_the_master_ends_the_run(monkeypatch):
     """A node beyond an edge: what, where, when, what to do, and the motion up to there."""
     from stridor.temporal.steppers.sparse import renewal
@@ -322,14 +380,16 @@ def test_leaving_the_master_ends_the_run(monkeypatch):
 
 
 def test_renewed_rows_go_on_with_the_gap_and_turn_the_friction_force():
-    """take_over: the gap a closed node was left at stays what the loop sees; its force in space stays what it was."""
+    """take_over: the gap a closed node was left at, over the curved master, stays what the loop sees; its force in space
+    stays what it was."""
     rng = np.random.default_rng(8)
     m, n, p = 4, 9, 1
 
     def nodes(tangents):
         return SimpleNamespace(
             gap=rng.standard_normal(m), normal=sp.csr_array(rng.standard_normal((m, n))),
-            normal_lift=rng.standard_normal((m, p)), tangents=tangents,
+            normal_lift=rng.standard_normal((m, p)), tangents=tangents, count=m, directions=2,
+            tangent=sp.csr_array(rng.standard_normal((2 * m, n))), tangent_lift=rng.standard_normal((2 * m, p)),
         )  # fmt: skip
 
     frame = np.tile(np.eye(3)[:2], (m, 1, 1))
@@ -341,19 +401,26 @@ def test_renewed_rows_go_on_with_the_gap_and_turn_the_friction_force():
     force[1] = 0.0
     before, offset_before, given = force.copy(), offset.copy(), []
     u, x = rng.standard_normal(n), rng.standard_normal(p)
+    radius, way = 3.0, np.array([0.3, -0.2, 0.0, 0.1])
+    along = np.array([0.6, 0.8])  # round a bore
+    reached = (old.tangent @ u + old.tangent_lift @ x).reshape(m, 2)
     machine = SimpleNamespace(
         nodes=old, contacts=SimpleNamespace(force=force, offset=offset), displacement=u,
-        state=SimpleNamespace(motion=[x]), set_nodes=given.append, surfaces=None,
+        state=SimpleNamespace(motion=[x]), set_nodes=lambda *args: given.extend(args), surfaces=None,
+        turning=Turning(np.tile(-np.outer(along, along) / radius, (m, 1, 1)), reached - way[:, None] * along),
     )  # fmt: skip
-    take_over(machine, ("new",), new)
-    assert given == [new]
+    turns = Turning.none(new)
+    take_over(machine, ("new",), new, turns)
+    assert given == [new, turns]
     assert machine.surfaces == ("new",)
 
-    def gap(of, extra):
-        return of.gap + of.normal @ u + of.normal_lift @ x + extra
+    def height(of):
+        return of.gap + of.normal @ u + of.normal_lift @ x
 
-    closed = before[:, 0] > 0
-    np.testing.assert_allclose(gap(new, offset)[closed], gap(old, offset_before)[closed], rtol=1e-12, atol=1e-12)
+    closed, cosine = before[:, 0] > 0, np.sqrt(1 - (way / radius) ** 2)
+    # In a bore: less than over the tangent plane by how far the circle has come up.
+    left = cosine * (height(old) - (radius - np.sqrt(radius**2 - way**2))) + offset_before
+    np.testing.assert_allclose((height(new) + offset)[closed], left[closed], rtol=1e-12, atol=1e-12)
     assert offset[~closed] == offset_before[~closed]
     in_space = np.einsum("mk,mkd->md", force[:, 1:], turned)
     np.testing.assert_allclose(in_space[:, :2], before[:, 1:], rtol=1e-12, atol=1e-12)

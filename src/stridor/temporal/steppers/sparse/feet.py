@@ -1,10 +1,14 @@
-"""Points that slide finitely in the compiled loop: their rows, gaps and compliances as the curves are in each step."""
+"""What slides finitely in the compiled loop: rows, gaps and compliances of points as their curves are in each step, and
+of nodes of surfaces as their normals turn between two renewals."""
 
 from __future__ import annotations
+
+import math
 
 from ....kernels import njit
 from ....typing import Array, IntArray
 from ..curve import ROWS, leaves, project_in, turn
+from .bends import FARTHEST, bent_gap
 from .node_stage import NodeScratch, NodeState
 from .node_table import NodeTable
 
@@ -83,3 +87,121 @@ def follow_feet(x: Array, u: Array, table: NodeTable, nodes: NodeState, work: No
                 table.act[table.act_at[i] + r, 0], table.act[table.act_at[i] + r, 1] = n, t
         block[1, 0] = block[0, 1]
     return code
+
+
+@njit(cache=True, allocates=False)
+def _turned(base: Array, turn: Array, out: Array) -> None:  # pragma: no cover - compiled
+    """R base (d,): normal and tangents of one entry turned by R (d, d)."""
+    for j in range(base.shape[0]):
+        total = 0.0
+        for o in range(base.shape[0]):
+            total += turn[j, o] * base[o]
+        out[j] = total
+
+
+@njit(cache=True, allocates=False)
+def _turn(angle: Array, turn: Array) -> None:  # pragma: no cover - compiled
+    """R = [c, θᵀ; −θ, 1 − θθᵀ/(1 + c)] (d, d), c² = 1 − θ²: the rotation of normal and tangents after which the normal
+    has the part θ (d − 1,) of the tangents."""
+    t, square = angle.shape[0], 0.0
+    for j in range(t):
+        square += angle[j] * angle[j]
+    turn[0, 0] = math.sqrt(max(1.0 - square, 0.0))
+    for j in range(t):
+        turn[0, j + 1], turn[j + 1, 0] = angle[j], -angle[j]
+        for o in range(t):
+            turn[j + 1, o + 1] = (1.0 if j == o else 0.0) - angle[j] * angle[o] / (1.0 + turn[0, 0])
+
+
+@njit(cache=True, allocates=False)
+def _away(k: int, x: Array, u: Array, table: NodeTable, work: NodeScratch) -> float:  # pragma: no cover - compiled
+    """What the rows that were found see of supports at x (p,) and a structure at u (size,) into work.away, the rotation
+    of normal and tangents there into work.turn; s·Ks [m]."""
+    bends, angle, away = table.bends, work.angle, work.away
+    i, t = bends.node[k], angle.shape[0]
+    for j in range(t + 1):
+        away[j] = 0.0
+        for e in range(table.ptr[i], table.ptr[i + 1]):
+            away[j] += bends.row[e, j] * u[table.indices[table.col[e]]]
+        for p in range(x.shape[0]):
+            away[j] += bends.lift[i, j, p] * x[p]
+    bend = size = 0.0
+    for j in range(t):
+        angle[j] = 0.0
+        for o in range(t):
+            angle[j] += bends.rate[k, j, o] * (away[o + 1] - bends.place[k, o])
+        bend += angle[j] * (away[j + 1] - bends.place[k, j])
+        size += angle[j] * angle[j]
+    if size > FARTHEST * FARTHEST:
+        for j in range(t):
+            angle[j] *= FARTHEST / math.sqrt(size)
+    _turn(angle, work.turn)
+    return bend
+
+
+@njit(cache=True, allocates=False)
+def mark_bends(x: Array, u: Array, table: NodeTable, work: NodeScratch) -> None:  # pragma: no cover - compiled
+    """Keep the rotations of the nodes whose normals turn at the beginning of a step."""
+    bends = table.bends
+    for k in range(bends.node.shape[0]):
+        _away(k, x, u, table, work)
+        for j in range(work.turn.shape[0]):
+            for o in range(work.turn.shape[0]):
+                bends.turn[k, j, o] = work.turn[j, o]
+
+
+@njit(cache=True, allocates=False)
+def follow_bends(x: Array, u: Array, table: NodeTable, work: NodeScratch) -> None:  # pragma: no cover - compiled
+    """Rows and gaps of the nodes whose normals turn at the end of a step, of supports at x (p,) and a structure at u
+    (size,), into the table, and what forces along the normals at its beginning push."""
+    bends, turn, away = table.bends, work.turn, work.away
+    d = turn.shape[0]
+    for k in range(bends.node.shape[0]):
+        i, before = bends.node[k], bends.turn[k]
+        bend = _away(k, x, u, table, work)
+        # The turned row sees the whole displacement: what it had before the rows were found is taken out again.
+        table.gap[i] = bent_gap(turn[0, 0], bend, bends.gap[i] + away[0])
+        for j in range(d):
+            table.gap[i] -= turn[0, j] * away[j]
+        _turn_rows(i, turn, table)
+        for e in range(table.push_ptr[i], table.push_ptr[i + 1]):
+            _turned(bends.push[e], before, table.push[e])
+        _turn_block(bends.block[i], turn, before, table.block[i])
+        if table.act.shape[0]:
+            for j in range(d):
+                for o in range(d):
+                    table.act[table.act_at[i] + o, j] = before[j, o]
+
+
+@njit(cache=True, allocates=False)
+def rows_of_forces(table: NodeTable) -> None:  # pragma: no cover - compiled
+    """Rows of the nodes whose normals turn as they were at the beginning of the step: those that the forces act along,
+    by which powers are told."""
+    for k in range(table.bends.node.shape[0]):
+        _turn_rows(table.bends.node[k], table.bends.turn[k], table)
+
+
+@njit(cache=True, allocates=False)
+def _turn_rows(i: int, turn: Array, table: NodeTable) -> None:  # pragma: no cover - compiled
+    """Rows and lifts of node i, turned, into the table."""
+    bends = table.bends
+    for e in range(table.ptr[i], table.ptr[i + 1]):
+        _turned(bends.row[e], turn, table.row[e])
+    for p in range(table.lift.shape[2]):
+        for j in range(turn.shape[0]):
+            table.lift[i, j, p] = 0.0
+            for o in range(turn.shape[0]):
+                table.lift[i, j, p] += turn[j, o] * bends.lift[i, o, p]
+
+
+@njit(cache=True, allocates=False)
+def _turn_block(base: Array, turn: Array, before: Array, out: Array) -> None:  # pragma: no cover - compiled
+    """R B Sᵀ (d, d): what forces along normal and tangents turned by S bring about along those turned by R."""
+    d = turn.shape[0]
+    for j in range(d):
+        for o in range(d):
+            total = 0.0
+            for a in range(d):
+                for b in range(d):
+                    total += turn[j, a] * base[a, b] * before[o, b]
+            out[j, o] = total

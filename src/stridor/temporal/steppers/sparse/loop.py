@@ -23,7 +23,7 @@ from ....kernels import njit
 from ....typing import Array
 from ...columns import DAMPING, FRICTION, NORMAL
 from ..borrow import borrow
-from .feet import follow_feet
+from .feet import follow_bends, follow_feet, mark_bends, rows_of_forces
 from .forcing import (
     CIRCULATORY,
     GYROSCOPIC,
@@ -95,6 +95,8 @@ def _after_contacts(
 ) -> tuple[float, float]:  # pragma: no cover - compiled
     """Powers of normal and tangential forces; what they send to supports, and statistics."""
     step, beta2, ratio = a.numbers[0], a.numbers[1], a.numbers[2:4]
+    if table.bends.node.shape[0]:
+        rows_of_forces(table)
     normal = friction = 0.0
     if count:
         normal, friction = contact_power(count, beta2, w.velocity, table, nodes, work)
@@ -163,6 +165,7 @@ def run_steps(
     table, nodes = borrow(table), borrow(nodes)
     work, state, w, record = borrow(work), borrow(state), borrow(w), borrow(record)
     step, skew, whole = a.numbers[0], x.force.shape[0] > 0, b.before.shape[0] > 0
+    turning = table.bends.node.shape[0] > 0
     for k in range(steps):
         begin_step(k, a, f, g, state, w)
         recording = state.counters[STEPS_DONE] % record.every == 0
@@ -170,12 +173,16 @@ def run_steps(
             return k, NOT_FINITE
         if skew:
             keep_before(f, x)
+        if turning:
+            mark_bends(state.motion[0], f.u, table, work)
         taken = 0.0
         if whole:
             advance_whole(a, f, b)
         else:
             taken = advance(a, f, w.power)
         code = follow_feet(w.displacement, f.u, table, nodes, work)
+        if turning:
+            follow_bends(w.displacement, f.u, table, work)
         normal, friction, extra = _forces_of_step(g.increments[k], a, f, x, b, table, nodes, work, state, w)
         taken += extra
         if whole:

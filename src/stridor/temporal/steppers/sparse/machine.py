@@ -19,6 +19,7 @@ from ...columns import FIRST_OPEN, FIRST_STICK, STATISTICS
 from ...inputs import DIAGONAL
 from ...schedule import Schedule
 from ..curve import ROWS, follow, foot
+from .bends import Turning
 from .damping import SplitDamping, no_damping, split_damping
 from .forcing import COUNTERS, CUBIC, LOOP_WORKS, SKEW_WORKS, STEPS_DONE, Forcing, LoopState, StepWork
 from .loop import run_steps
@@ -36,8 +37,8 @@ OFFSET_STEPS = 100  # in which the gap that a renewal of the rows made fades
 
 @dataclass
 class Machine:
-    """Arrays and state. surfaces follow the sliding; nodes are the contacts as they are paired now; answers gives what
-    unit forces along rows move over one step."""
+    """Arrays and state. surfaces follow the sliding; nodes are the contacts as they are paired now, turning how their
+    normals turn from there; answers gives what unit forces along rows move over one step."""
 
     system: System
     scheme: Scheme
@@ -54,6 +55,7 @@ class Machine:
     table: NodeTable
     contacts: NodeState
     scratch: NodeScratch
+    turning: Turning
 
     @property
     def done(self) -> int:
@@ -74,10 +76,13 @@ class Machine:
         """Run the two parts of the structure at once or one after the other, which changes no number."""
         self.structure.flags[3] = two
 
-    def set_nodes(self, nodes: ContactNodes) -> None:
-        """Take contact nodes as they are paired now; forces, status and offsets are kept."""
-        self.nodes = nodes
-        self.table = packed_nodes(self.system, nodes, self.layout, (self.whole, self.answers), self.contacts.segment)
+    def set_nodes(self, nodes: ContactNodes, turning: Turning | None = None) -> None:
+        """Take contact nodes as they are paired now, and how their normals turn as they slide; forces, status and
+        offsets are kept."""
+        self.nodes, self.turning = nodes, Turning.none(nodes) if turning is None else turning
+        self.table = packed_nodes(
+            self.system, nodes, self.layout, (self.whole, self.answers), self.contacts.segment, self.turning
+        )
         self.scratch = _scratch(self.table)
         self.contacts = self.contacts._replace(q=self.fields.q[self.table.indices])
 
@@ -87,7 +92,7 @@ class Machine:
         for i, contact in enumerate(self.system.contacts):
             if contact.sliding == "finite":
                 segment[i], xi[i] = follow(int(segment[i]), float(xi[i]), contact.chords)
-        self.set_nodes(self.nodes)
+        self.set_nodes(self.nodes, self.turning)
 
     def show(self) -> None:
         """Bring what the stiffness and the damping see up to u and q."""
@@ -165,17 +170,18 @@ def assembled_machine(system: System, scheme: Scheme, nodes: ContactNodes, *, la
     forcing = _forcing(system, layout)
     return Machine(
         system, scheme, layout, structure, fields, skew, matrix, answers, forcing, state, nodes, system.surfaces,
-        table, contacts, _scratch(table),
+        table, contacts, _scratch(table), Turning.none(nodes),
     )  # fmt: skip
 
 
 def packed_nodes(
-    system: System, nodes: ContactNodes, layout: Layout, matrix: tuple[StepMatrix, Answers], segments: IntArray
-) -> NodeTable:
+    system: System, nodes: ContactNodes, layout: Layout, matrix: tuple[StepMatrix, Answers], segments: IntArray,
+    turning: Turning | None = None,
+) -> NodeTable:  # fmt: skip
     """Contact nodes on the entries of a layout; segments (m,) that points which slide finitely are in."""
     return node_table(
         nodes, layout, matrix[1], system.motion.full, whole=len(matrix[0].before) > 0, contacts=system.contacts,
-        segments=segments,
+        segments=segments, turning=turning,
     )  # fmt: skip
 
 
@@ -273,6 +279,9 @@ def _scratch(table: NodeTable) -> NodeScratch:
         foot=foot(),
         normal=np.zeros(ROWS),
         tangent=np.zeros(ROWS),
+        angle=np.zeros(t),
+        turn=np.zeros((t + 1, t + 1)),
+        away=np.zeros(t + 1),
     )
 
 

@@ -13,6 +13,7 @@ from ....contact.nodes import ContactNodes
 from ....laws.friction import friction_rows
 from ....typing import Array, BoolArray, IntArray, Sparse
 from ..curve import ROWS, nodes_of
+from .bends import Bends, Turning, bends_of
 from .storage import Layout
 
 # What unit forces along rows (r, size) csr on entries move over one step: rows (r, size) [m/N], csr.
@@ -69,6 +70,7 @@ class NodeTable(NamedTuple):
     weight: Array
     kept: IntArray
     curves: Curves
+    bends: Bends
 
 
 class _Rows(NamedTuple):
@@ -82,14 +84,16 @@ class _Rows(NamedTuple):
 def node_table(
     nodes: ContactNodes, layout: Layout, answers: Answers, factors: Array, *,
     whole: bool = False, contacts: Sequence[Contact] = (), segments: IntArray | None = None,
+    turning: Turning | None = None,
 ) -> NodeTable:  # fmt: skip
     """Pack nodes. factors (p,) are those of the motions at full velocity; whole: forces move more than contacts touch;
-    contacts: the point contacts, the first of the nodes, and segments (c,) that those which slide finitely are in."""
+    contacts: the point contacts, the first of the nodes, and segments (c,) that those which slide finitely are in;
+    turning: how the normals of the others turn as they slide."""
     m, t = nodes.count, nodes.directions
     d = t + 1
     finite = [k for k, contact in enumerate(contacts) if contact.sliding == "finite"]
-    turning: BoolArray = np.isin(np.arange(m), finite)
-    fixed = _fixed_rows(nodes, layout, turning)
+    on_curves: BoolArray = np.isin(np.arange(m), finite)
+    fixed = _fixed_rows(nodes, layout, on_curves)
     base = _base_rows(contacts, layout, finite, segments)
     fixed_answers, base_answers = (_without_zeros(answers(each.matrix)) for each in (fixed, base))
     touched = [sp.coo_array(each).col for each in (fixed.matrix, base.matrix)]
@@ -97,7 +101,7 @@ def node_table(
     ptr, col, row = _by_node(m, d, index, (fixed.matrix, base.matrix), fixed, base)
     push_ptr, push_col, push = _by_node(m, d, index, (fixed_answers, base_answers), fixed, base)
     block = np.zeros((m, d, d))
-    still = np.flatnonzero(~turning)
+    still = np.flatnonzero(~on_curves)
     for j in range(d):
         for k in range(d):
             together = fixed.matrix[fixed.place == j].multiply(fixed_answers[fixed.place == k])
@@ -111,7 +115,8 @@ def node_table(
         order = np.argsort(np.concatenate([fixed.node, base.node]), kind="stable")
         act = np.concatenate([np.eye(d)[fixed.place], np.zeros((len(base.node), d))])[order]
         dense = sp.csr_array(sp.vstack([fixed_answers, base_answers])).toarray()[order]
-        acting = np.where(turning, ROWS, d)
+        acting = np.where(on_curves, ROWS, d)
+    gap = np.array(nodes.gap, dtype=float)
     return NodeTable(
         indices=index,
         ptr=ptr,
@@ -121,7 +126,7 @@ def node_table(
         push_col=push_col,
         push=push,
         lift=lift,
-        gap=np.array(nodes.gap, dtype=float),
+        gap=gap,
         compliance=np.array(nodes.compliance, dtype=float),
         cubic=np.array(nodes.cubic, dtype=float),
         block=block,
@@ -136,6 +141,7 @@ def node_table(
         curves=_curves(
             contacts, finite, segments, base.matrix[:, index].toarray(), base_answers[:, index].toarray(), p
         ),
+        bends=bends_of(Turning.none(nodes) if turning is None else turning, row, push, lift, gap, block),
     )
 
 

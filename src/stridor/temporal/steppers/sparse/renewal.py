@@ -1,8 +1,8 @@
 """Finite sliding of surfaces: rows and gaps found again as the bodies move over each other.
 
-Between renewals the rows stay; they are renewed before any node has slid a thousandth of the distance between nodes.
-Where a node in contact is found at another gap than the loop left it at (it was zero along the old rows), the
-difference becomes an offset that fades over a hundred steps: no kick enters the motion.
+They are renewed before any node has slid a thousandth of the distance between nodes, and between renewals follow the
+master's curvature (`bends`). Where a node in contact is found at another gap than the loop left it at, the difference
+becomes an offset that fades over a hundred steps: no kick enters the motion.
 """
 
 from __future__ import annotations
@@ -13,14 +13,18 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ....contact.nodes import ContactNodes, stack
+from ....contact.obstacles import Cylinder, Flat
 from ....contact.pairing import repair
 from ....contact.surfaces import SurfaceContact
 from ....system import System
 from ....typing import Array, IntArray
+from .bends import TURN, Turning
 from .machine import Machine
 
 SLIDE = 1e-3  # of the distance between nodes
 MOST_STEPS = 200
+PROBE = 1e-4  # of that distance: behind which the master's normal is looked at again
+KINK = 1e-2  # rad over it: an edge, not a curve
 
 
 # Under a name of its own: the one thing here that knows geometry.
@@ -31,7 +35,6 @@ def renew(
     machine: Machine, surfaces: tuple[SurfaceContact, ...]
 ) -> tuple[tuple[SurfaceContact, ...], ContactNodes, IntArray]:
     """Surfaces and nodes paired at the present displacement, and the nodes (l,) that have left their master."""
-    u, x = machine.displacement, machine.state.motion[0]
     found: list[SurfaceContact] = []
     lost: list[IntArray] = []
     first = len(machine.system.contacts)
@@ -39,16 +42,43 @@ def renew(
         if surface.sliding == "small":
             found.append(surface)
         else:
-            d = machine.system.dimension
-            slave = (surface.slave.free @ u + surface.slave.lift @ x).reshape(-1, d)
-            master = (surface.master_rows.free @ u + surface.master_rows.lift @ x).reshape(-1, d)
-            new, gone = found_again(surface, slave, master)
+            new, gone = found_again(surface, *_displaced(machine, surface))
             lost.append(first + gone)
             found.append(new)
         first += surface.nodes.count
     points = machine.nodes.select(np.arange(len(machine.system.contacts)))
     nodes = _joined(machine, points, found)
     return tuple(found), nodes, np.concatenate([np.zeros(0, dtype=np.int64), *lost])
+
+
+def _displaced(machine: Machine, surface: SurfaceContact) -> tuple[Array, Array]:
+    """Displacements (m, d) and (k, d) [m] of slave and master nodes, with those of the supports."""
+    u, x, d = machine.displacement, machine.state.motion[0], machine.system.dimension
+    slave, master = surface.slave, surface.master_rows
+    return (slave.free @ u + slave.lift @ x).reshape(-1, d), (master.free @ u + master.lift @ x).reshape(-1, d)
+
+
+def turning(machine: Machine, surfaces: tuple[SurfaceContact, ...], nodes: ContactNodes, distances: Array) -> Turning:
+    """How the normals of nodes just found turn as these slide on: by the master's normals a little further on along
+    each tangent. Nodes of bodies whose material slides through their mesh stay where they are; so do their normals."""
+    found = Turning.none(nodes)
+    place = nodes.tangent @ machine.displacement + nodes.tangent_lift @ machine.state.motion[0]
+    found.place[:] = place.reshape(found.place.shape)
+    first = len(machine.system.contacts)
+    for k, surface in enumerate(surfaces):
+        own = slice(first, first + surface.nodes.count)
+        first = own.stop
+        if surface.sliding == "small" or surface.joined is not None or np.any(surface.drift):
+            continue
+        slave, master = _displaced(machine, surface)
+        tangents, normals, probe = nodes.tangents[own], nodes.normals[own], PROBE * distances[k]
+        for j in range(nodes.directions):
+            there = surface.slave_position + slave + probe * tangents[:, j]
+            change = surface.master.locate(there, master, guess=surface.location.facet).normal - normals
+            along = np.einsum("mkd,md->mk", tangents, change)
+            curved = np.linalg.norm(along, axis=1, keepdims=True) <= KINK
+            found.rate[own, :, j] = np.where(curved, along / probe, 0.0)
+    return found
 
 
 def _joined(machine: Machine, points: ContactNodes, surfaces: list[SurfaceContact]) -> ContactNodes:
@@ -62,18 +92,20 @@ def _joined(machine: Machine, points: ContactNodes, surfaces: list[SurfaceContac
     return replace(together, names=old.names, owner=old.owner, laws=old.laws, cubic=old.cubic, closed=old.closed)
 
 
-def take_over(machine: Machine, surfaces: tuple[SurfaceContact, ...], nodes: ContactNodes) -> None:
+def take_over(
+    machine: Machine, surfaces: tuple[SurfaceContact, ...], nodes: ContactNodes, turns: Turning
+) -> None:
     """Go on with renewed rows: gaps of closed nodes continue, tangential forces turn with their frames."""
     old, contacts = machine.nodes, machine.contacts
     u, x = machine.displacement, machine.state.motion[0]
     closed = contacts.force[:, 0] != 0.0
-    before = old.gap + old.normal @ u + old.normal_lift @ x + contacts.offset
+    before = machine.turning.gap(old, u, x) + contacts.offset
     after = nodes.gap + nodes.normal @ u + nodes.normal_lift @ x
     contacts.offset[closed] = (before - after)[closed]
     pulls = np.einsum("mk,mkd->md", contacts.force[:, 1:], old.tangents)
     contacts.force[:, 1:] = np.einsum("md,mkd->mk", pulls, nodes.tangents)
     machine.surfaces = surfaces
-    machine.set_nodes(nodes)
+    machine.set_nodes(nodes, turns)
 
 
 def node_distances(system: System) -> Array:
@@ -85,21 +117,27 @@ def node_distances(system: System) -> Array:
             found.append(float(np.median(cKDTree(position).query(position, k=2)[0][:, 1])))
         else:
             found.append(float(surface.area[0]) ** (1.0 / (position.shape[1] - 1)))
+        if isinstance(surface.master, Cylinder):
+            found[-1] = min(found[-1], surface.master.radius)
     return np.array(found)
 
 
 def steps_to_renewal(machine: Machine, distances: Array, last: int) -> int:
-    """Steps until a node of a finitely sliding surface has slid far enough at its present speed; at most twice as many
-    as the ``last`` time, for what starts from rest does not stay at its speed."""
+    """Steps until a node of a finitely sliding surface has slid far enough at its present speed, or its normal turned;
+    at most twice as many as the ``last`` time, for what starts from rest does not stay at its speed."""
     nodes = machine.nodes
     q = machine.fields.q[machine.layout.index]
     slip = (nodes.tangent @ q + nodes.tangent_lift @ machine.state.motion[1]).reshape(nodes.count, -1)
     speed = np.linalg.norm(slip, axis=1)
+    turned = np.linalg.norm(np.einsum("mjk,mk->mj", machine.turning.rate, slip), axis=1)
     points = len(machine.system.contacts)
     steps = min(2 * last, MOST_STEPS)
     for k, surface in enumerate(machine.system.surfaces):
         if surface.sliding == "finite":
-            fastest = float(speed[nodes.owner == points + k].max(initial=0.0))
-            if fastest > 0.0:
-                steps = min(steps, int(SLIDE * distances[k] / (fastest * machine.scheme.step)))
+            mine = nodes.owner == points + k
+            most_way = np.inf if isinstance(surface.master, Cylinder | Flat) else SLIDE * distances[k]
+            for fastest, most in ((speed[mine], most_way), (turned[mine], TURN)):
+                rate = float(fastest.max(initial=0.0)) * machine.scheme.step
+                if rate > 0.0 and np.isfinite(most):
+                    steps = min(steps, int(most / rate))
     return max(steps, 1)

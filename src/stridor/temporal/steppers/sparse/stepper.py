@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....errors import AnalysisError
+from ....errors import AnalysisError, CaseError
 from ....system import System
 from ....typing import Array
 from ...beta2 import StepLimit, scheme, step_limit
@@ -20,13 +20,14 @@ from ...stepper import Disturbance
 from ...trajectory import Trajectory
 from ..curve import check_stiffness, left_the_line
 from ..friction import frictional
+from .bends import Turning
 from .feet import NEW_ROWS, OFF_LINE
 from .forcing import KEPT, MOST_SWEEPS, NODES_KEPT, STEPS_DONE, UNCONVERGED
 from .limit import step_limit_assembled
 from .loop import NOT_FINITE
 from .machine import Machine, assembled_machine, diagonal_mass
 from .records import SKEW_COLUMNS, buffers, node_history
-from .renewal import node_distances, renew, steps_to_renewal, take_over
+from .renewal import node_distances, renew, steps_to_renewal, take_over, turning
 from .start import begin
 
 # What moves on from step to step, by the part of the machine that holds it.
@@ -129,6 +130,8 @@ class SparseStepper:
         """The same, the arrays themselves."""
         machine = self.machine
         held: dict[str, Array] = {"renewal": self.renewal, "renewed_at": self.renewed_at}
+        if self.finite:
+            held |= {"turning_rate": machine.turning.rate, "turning_place": machine.turning.place}
         for part, names in SAVED.items():
             held |= {f"{part}_{name}": getattr(getattr(machine, part), name) for name in names}
         return held
@@ -147,21 +150,26 @@ class SparseStepper:
         }
 
     def check(self, restart: Trajectory) -> None:
-        """Freedoms are freedoms, whatever the bodies."""
+        """Freedoms are freedoms, whatever the bodies. Raises CaseError for finite sliding as older versions had it."""
+        if self.finite and "turning_rate" not in restart.state:
+            accepted = "start it anew: contacts that slide finitely now follow the curvature of their masters"
+            raise CaseError("restart", "a run of an older version of stridor", accepted)
 
     def resume(self, restart: Trajectory, schedule: Schedule, *, changed: bool) -> None:
         """Take up a state that was checked."""
         machine, size = self.machine, self.system.size
         machine.contacts.segment[:] = restart.state["contacts_segment"]
-        machine.set_nodes(machine.nodes)
+        machine.set_nodes(machine.nodes, machine.turning)
         if self.finite:
             # Rows as they were last found: first at that displacement, then the state itself.
             machine.fields.u[machine.layout.index] = restart.state["renewed_at"][:size]
             machine.state.motion[0] = restart.state["renewed_at"][size:]
             surfaces, nodes, _ = renew(machine, machine.surfaces)
-            take_over(machine, surfaces, nodes)
+            take_over(machine, surfaces, nodes, Turning.none(nodes))
         for name, held in self._moving().items():
             held[:] = restart.state[name]
+        if self.finite:
+            machine.set_nodes(machine.nodes, machine.turning)
         machine.contacts.q[:] = machine.fields.q[machine.table.indices]
         machine.state.counters[[KEPT, NODES_KEPT]] = 0  # files of older versions have them
         if changed:
@@ -212,7 +220,7 @@ class SparseStepper:
                 f"contact {contact}: the slave node at ({coordinates}) left the master surface over an edge at "
                 f"t = {at:.6g} s (phase {phase}); shorten the phase, slow the support down or make the master larger"
             )
-        take_over(machine, surfaces, nodes)
+        take_over(machine, surfaces, nodes, turning(machine, surfaces, nodes, self.distances))
         interval = steps_to_renewal(machine, self.distances, int(self.renewal[1]))
         self.renewal[:] = self.done + interval, interval
         self.renewed_at[:] = np.concatenate([machine.displacement, machine.state.motion[0]])
