@@ -7,6 +7,7 @@ import pytest
 
 import stridor as st
 from benches import paper_case
+from stridor.io.result_checks import check_results
 from stridor.study.ensemble_numbers import numbers_of, observable_of
 from stridor.study.settings import settings_of
 from stridor.system import build_system
@@ -66,6 +67,68 @@ def test_amplitudes_are_of_the_window_about_its_mean():
     found = observed(signal, CHANGES)
     assert found.rms == pytest.approx(3.0 / np.sqrt(2.0), rel=1e-3)
     assert found.peak == pytest.approx(3.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(("slow", "told"), [(3.0, True), (0.1, False)])
+def test_what_is_stronger_than_the_line_and_slower_than_the_window_resolves_is_told(slow, told):
+    """A swing of one period in the window, beside a line of ten."""
+    time = STEP * np.arange(COUNT)
+    swing = slow * np.sin(2 * np.pi * 2 / (STEP * COUNT) * time)
+    found = observed(np.sin(2 * np.pi * LINE * time) + swing, CHANGES)
+    assert found.frequency_hz == pytest.approx(LINE, rel=1e-2)
+    assert np.isfinite(found.stronger_below_hz) == told
+    if told:  # the third bin of Hann's window over half of what the filter leaves
+        assert 6 / (STEP * COUNT) <= found.stronger_below_hz <= 9.01 / (STEP * COUNT)
+
+
+SHORT = {
+    "bodies.beam1.elements": 6, "bodies.beam2.elements": 18, "temporal.step": 2e-7, "temporal.record_every": 5,
+    "phases.press.duration": 1e-3, "phases.slide.duration": 2e-3, "modal.max_frequency_hz": 12e3,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def short() -> st.Ensemble:
+    """Of two members with a line beside a mode that grows, 8.6 kHz, the one whose line dominates the window last."""
+    return st.ensemble(paper_case().with_(SHORT), mu=0.1, speed=[1.0, 2.0])
+
+
+def test_no_mode_is_named_where_something_slower_is_stronger(short):
+    case = paper_case().with_(SHORT)
+    summary = st.summarise(case, st.simulate(case, 0.1))
+    assert summary.stronger_below_hz is not None
+    # Its window begins a record later.
+    assert short.frequency_hz[0] == pytest.approx(summary.dominant_frequency_hz, rel=1e-3)
+    assert short.stronger_below_hz[0] == pytest.approx(summary.stronger_below_hz, rel=2e-3)
+    assert abs(short.frequency_hz[0] / short.mode_hz[1] - 1.0) < 0.05, "a mode would be named by its frequency"
+    assert np.isnan(short.stronger_below_hz[1])
+    assert short.mode.tolist() == [0, 8]
+    assert np.isnan([short.mode_hz[0], short.mode_deviation[0]]).all()
+    said = (
+        "the line of 1 member does not dominate, and no mode is named for it: what swings or drifts below 4497.8 Hz is "
+        "stronger, and the window is too short to tell its frequency: give the phase a longer duration to see it"
+    )
+    assert said in short.notes
+
+
+@pytest.mark.parametrize("how", [{"separately": True}, {"sweep": "both", "swept": "speed"}])
+def test_every_way_to_run_members_tells_what_is_stronger(short, how):
+    other = st.ensemble(paper_case().with_(SHORT), mu=0.1, speed=[1.0, 2.0], **how)
+    assert other.stronger_below_hz[0] == short.stronger_below_hz[0]
+    assert other.mode[0] == 0
+    named = other.mode > 0
+    assert not np.any(named & np.isfinite(other.stronger_below_hz))
+
+
+def test_files_tell_what_is_stronger_and_those_of_earlier_versions_open(short, tmp_path):
+    heads, rows = short.table()
+    column = [row[heads.index("stronger_below_hz")] for row in rows]
+    assert column == [m["stronger_below_hz"] for m in short.to_json()["members"]] == [short.stronger_below_hz[0], None]
+    data = st.open(st.save(short, tmp_path / "now.nc"))
+    np.testing.assert_array_equal(data.stronger_below_hz.values.ravel(), short.stronger_below_hz)
+    assert data.stronger_below_hz.attrs["units"] == "Hz"
+    check_results(short.to_xarray().drop_vars("stronger_below_hz"))
+    assert "stronger below [Hz]" in short._repr_html_()
 
 
 @pytest.mark.parametrize(

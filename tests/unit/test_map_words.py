@@ -127,8 +127,8 @@ def ensemble(mu: int, speed: int = 1, *, contacts: tuple[str, ...] = ("A",), swe
     return Ensemble(
         mu=np.tile(grid[0], 1 + sweep), load=np.ones(rows), speed=np.tile(grid[1], 1 + sweep),
         perturbation=np.zeros(rows), sweep=tuple(b for b in branches for _ in range(size)), slip_speed=np.ones(rows),
-        observable="beam1.tip.velocity", unit="m/s", rms=1e-3 * tall, peak=tall, frequency_hz=tall, stick=share,
-        slip=1 - share, separation=share, contact_names=contacts, growth_rate=np.zeros(rows), regime=("steady",) * rows,
+        observable="beam1.tip.velocity", unit="m/s", rms=1e-3 * tall, peak=tall, frequency_hz=tall,
+        stronger_below_hz=np.full(rows, np.nan), stick=share, slip=1 - share, separation=share, contact_names=contacts, growth_rate=np.zeros(rows), regime=("steady",) * rows,
         mode=np.arange(rows) % 30 + 1, mode_hz=tall, mode_deviation=np.zeros(rows), error=("",) * rows,
         window=(0.005, 0.01), step=1e-8, method="", modal=modal,
         axes=(("mu", mus), ("load", np.ones(1)), ("speed", speeds), ("perturbation", np.zeros(1))),
@@ -171,6 +171,21 @@ def test_an_ensemble_says_what_its_marks_mean():
     assert "no room for the numbers of the modes that respond: see the table" in told
     assert "shares: the largest of all contacts" in told
     assert not many.axes[1].texts
+
+
+@pytest.mark.parametrize(("mu", "speed", "sweep"), [(6, 4, False), (6, 1, True)])
+def test_members_whose_line_does_not_dominate_have_a_cross_and_no_number(mu: int, speed: int, sweep: bool):
+    whole = ensemble(mu, speed, sweep=sweep)
+    chosen = np.arange(len(whole)) % 3 == 0
+    told = replace(whole, stronger_below_hz=np.where(chosen, 500.0, np.nan), mode=np.where(chosen, 0, whole.mode))
+    figure = st.plot.ensemble_map(told)
+    crosses = [line.get_xydata()[0].tolist() for line in figure.axes[1].lines if line.get_marker() == "x"]
+    height = whole.speed if speed > 1 else whole.frequency_hz / 1e3
+    assert crosses == np.column_stack([whole.mu, height])[chosen].tolist()
+    assert len(figure.axes[1].texts) == np.count_nonzero(~chosen)
+    head = figure._suptitle.get_text().replace("\n", " ")
+    assert "cross: something too slow for the window is stronger" in head
+    assert clashes(figure) == []
 
 
 def test_panels_of_an_ensemble_have_their_units():

@@ -38,6 +38,7 @@ from stridor.studies.summary import answer, tables
 from stridor.studies.tables import Keep
 from stridor.studies.task import SampleBatch, Task
 from stridor.studies.workers import LOADED, LocalWorkers
+from stridor.study.run_summary import slower_is_stronger
 from undrawn import nothing_drawn
 
 COARSER = ["bodies.beam1.elements=6", "bodies.beam2.elements=18"]
@@ -717,6 +718,22 @@ def test_a_run_of_a_study_vibrates_as_strongly_as_that_of_an_ensemble(case: st.C
     assert found.data["velocity_rms"].attrs["units"] == "m/s"
 
 
+GROWS = {"temporal.initial": "steady-sliding", "temporal.perturbation": 1e-4, "phases.press.velocities.clamp": 1.0}
+
+
+@pytest.mark.parametrize(("start", "told"), [({}, True), (GROWS, False)])
+def test_a_run_of_a_study_carries_what_is_stronger_than_its_line(start: dict[str, Any], told: bool) -> None:
+    changes = {"temporal.step": 2e-7, "temporal.record_every": 5, "phases.press.duration": 1e-3, "phases.slide.duration": 2e-3}
+    coarser = st.loads(template_text("two-beams"), [*COARSER, "modal.max_frequency_hz=12e3"])
+    short = coarser.with_(changes | start)
+    summary = st.summarise(short, st.simulate(short, 0.1))
+    assert (summary.stronger_below_hz is not None) is told
+    row = full_row(short, "simulate", {"mu": 0.1}, Keep())
+    said = "" if summary.stronger_below_hz is None else slower_is_stronger(summary.stronger_below_hz)
+    assert row["note"] == said
+    assert row["stronger_below_hz"] == (summary.stronger_below_hz if told else pytest.approx(np.nan, nan_ok=True))
+
+
 def test_a_store_that_never_had_a_later_result_is_not_damaged(case: st.Case, tmp_path: Path) -> None:
     short = case.with_({"phases": [{"name": "go", "duration": 2e-4}], "temporal.record_every": 1})
     study = st.Study(case=short, compute="simulate", parameters={"mu": {"values": (0.1, 0.3)}})
@@ -735,14 +752,16 @@ def test_a_store_that_never_had_a_later_result_is_not_damaged(case: st.Case, tmp
     assert stridor("plot", "now", cwd=tmp_path).returncode == 0
 
 
-def as_before(folder: Path, lacks: str) -> None:
-    """Make a store one that an earlier version began, which wrote no such result and no list of results."""
+def as_before(folder: Path, *lacks: str) -> None:
+    """Make a store one that an earlier version began, which wrote no such results, and a list of those that it wrote
+    unless it lacks all that came before there was one."""
     head = folder / "study.zarr" / "zarr.json"
-    shutil.rmtree(folder / "study.zarr" / lacks)
+    for name in lacks:
+        shutil.rmtree(folder / "study.zarr" / name)
     written = json.loads(head.read_text(encoding="utf-8"))
     names = json.loads(written["attributes"].pop("columns"))
-    if lacks not in LATER:
-        written["attributes"]["columns"] = json.dumps([name for name in names if name != lacks])
+    if not set(LATER) <= set(lacks):
+        written["attributes"]["columns"] = json.dumps([name for name in names if name not in lacks])
     made = json.loads(written["attributes"]["provenance"]) | {"programs": ["0.0.9 abc"]}
     written["attributes"]["provenance"] = json.dumps(made)
     head.write_text(json.dumps(written), encoding="utf-8")
@@ -752,7 +771,7 @@ def test_a_store_without_a_later_result_is_gone_on_with(case: st.Case, tmp_path:
     short = case.with_({"phases": [{"name": "go", "duration": 2e-4}], "temporal.record_every": 1})
     study = st.Study(case=short, compute="simulate", parameters={"mu": {"values": (0.1, 0.3)}})
     st.run_study(study, tmp_path, workers=1)
-    as_before(tmp_path, "velocity_rms")
+    as_before(tmp_path, "velocity_rms", "stronger_below_hz")
     store = OpenStore.opened(tmp_path / "study.zarr", variables("simulate"))
     store._put(next(v for v in store.variables if v.name == "status"), np.array([1]), {1: {"status": PENDING}})
     with pytest.raises(st.CaseError, match=r"was begun by another stridor \(0.0.9 abc; .*--go-on"):
@@ -760,13 +779,24 @@ def test_a_store_without_a_later_result_is_gone_on_with(case: st.Case, tmp_path:
     told: list[str] = []
     found = st.run_study(study, tmp_path, workers=1, go_on=True, say=told.append)
     assert np.isfinite(found.data["velocity_rms"].values).tolist() == [False, True]
-    line = "velocity_rms: not known of 1 row of an earlier stridor (NaN)"
+    line = "stronger_below_hz, velocity_rms: not known of 1 row of an earlier stridor (NaN)"
     assert f"warning: {line}" in told
     assert line in found.notes
     told.clear()
     again = st.run_study(study, tmp_path, workers=1, say=told.append)
     assert not [words for words in told if "velocity_rms" in words]
     assert line in again.notes
+
+
+def test_a_store_that_does_not_tell_what_is_stronger_opens_and_is_drawn(case: st.Case, tmp_path: Path) -> None:
+    short = case.with_({"phases": [{"name": "go", "duration": 2e-4}], "temporal.record_every": 1})
+    st.run_study(st.Study(case=short, compute="simulate", parameters={"mu": {"values": (0.1, 0.3)}}), tmp_path, workers=1)
+    as_before(tmp_path, "stronger_below_hz")
+    older = st.open_study(tmp_path)
+    assert "stronger_below_hz" not in older.data
+    assert "stronger_below_hz" not in dict(older.data.attrs)["columns"]
+    assert set(st.study_figures(older)) == {"over-mu"}
+    assert OpenStore.opened(tmp_path / "study.zarr", variables("simulate")).complete() == ["stronger_below_hz"]
 
 
 def test_a_store_that_cannot_be_completed_is_refused_with_the_reason(case: st.Case, tmp_path: Path) -> None:

@@ -24,6 +24,7 @@ from stridor.studies.plots import growth_over, onset_cloud, root_locus
 from stridor.studies.result import StudyResult
 from stridor.studies.rows import variables
 from stridor.studies.sampling import samples
+from stridor.studies.summary import tables
 from undrawn import nothing_drawn
 
 MASS, THICK = "bodies.beam1.damping.mass", "bodies.beam1.thickness"
@@ -374,6 +375,26 @@ def test_a_study_of_runs_shows_how_strong_how_high_and_what_contacts_do() -> Non
     assert ordinates(share, "stick") == pytest.approx([0.0, 0.1, 0.2, 0.3])
     assert ordinates(share, "slip") == pytest.approx([0.5, 0.4, 0.3, 0.2])
     assert ordinates(share, "separation") == pytest.approx([0.5] * 4)
+
+
+def slow(at: dict) -> dict:
+    """Runs of which those under little friction have something slower that is stronger than their line."""
+    return in_time(at) | {"stronger_below_hz": np.where(at["mu"] < 0.15, 4e3, np.nan)}
+
+
+def test_a_study_of_runs_tells_lines_that_do_not_dominate() -> None:
+    frequency = results_over(result_of(study_of(ONE, compute="simulate"), slow), "mu").axes[1]
+    assert ordinates(frequency, "nothing slower told") == pytest.approx([8000.2, 8000.3])
+    assert ordinates(frequency, "something slower is stronger") == pytest.approx([8e3, 8000.1])
+    result = result_of(study_of(TWO, compute="simulate"), slow)
+    panel = next(ax for ax in maps(result).axes if ax.get_title(loc="left") == "dominant frequency [Hz]; ×: slower is stronger")
+    coloured, crossed = panel.collections
+    assert len(coloured.get_offsets()) == 12
+    assert sorted(set(crossed.get_offsets()[:, 0].tolist())) == pytest.approx([0.0, 0.1])
+    assert [row[-1] for title, _, rows in tables(result) for row in rows if row[0] == "stronger_below_hz"] == ["6"]
+    older = StudyResult(result.path, result.data.drop_vars("stronger_below_hz"))
+    assert len(maps(older).axes[1].collections) == 1
+    assert ordinates(results_over(older, "mu").axes[1], "") == pytest.approx(sorted(older.data["dominant_frequency_hz"].values))
 
 
 def test_runs_of_a_store_without_their_strength_are_drawn_without_it() -> None:

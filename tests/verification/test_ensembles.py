@@ -299,7 +299,11 @@ def test_contacts_that_slide_far_take_separate_runs_and_a_note_says_so():
     case = case.with_({"phases.slide.duration": 3e-3})
     found = st.ensemble(case, mu=[0.05, 0.3], modes=False)
     assert found.method == "separate runs"
-    assert found.notes == ('separate runs, not side by side: sliding = "finite" at A',)
+    assert found.notes == (
+        'separate runs, not side by side: sliding = "finite" at A',
+        "the line of 2 members does not dominate, and no mode is named for it: what swings or drifts below 2001.1 Hz is "
+        "stronger, and the window is too short to tell its frequency: give the phase a longer duration to see it",
+    )
     run = st.simulate(case, 0.3)
     half = len(run.velocity[run.phase_slice()]) // 2
     tail = run.velocity[run.phase_slice(), 0][half:]
@@ -423,7 +427,7 @@ def test_the_modal_map_is_that_of_the_modes_at_each_friction_and_speed():
 def test_members_under_other_loads_have_the_modes_of_their_own_load():
     law = 'law = "weakening", coefficient = 0.2, static_coefficient = 0.8, decay_speed = 0.5'
     changes = {"temporal.stepper": "explicit", "springs.a.damping": 0.1, "springs.b.damping": 0.1}
-    changes |= {"temporal.perturbation": 1e-4, "phases.slide.duration": 20.0}
+    changes |= {"temporal.perturbation": 1e-4, "phases.slide.duration": 100.0}  # nine periods in the window
     case = st.loads(RUBBING.replace("LAW", law)).with_(changes)
     found = st.ensemble(case, mu=0.4, load=[0.1, 1.0, 4.0], separately=True)
     counts = []
@@ -437,5 +441,5 @@ def test_members_under_other_loads_have_the_modes_of_their_own_load():
     assert found.modal.load == 1.0
     assert found.modal.unstable.tolist() == [[counts[1]]]
     assert not np.isfinite(found.mode_hz[0])
-    assert np.isfinite(found.mode_hz[-1])
+    assert np.isfinite(found.mode_hz[1:]).all()
     assert any("modes depend on the loads" in note for note in found.notes)

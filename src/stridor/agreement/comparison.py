@@ -480,9 +480,7 @@ def stronger_below(run: Trajectory, max_frequency_hz: float) -> float | None:
     signal = _response(run)
     if signal is None:
         return None
-    spec = spectrum_of_end(low_passed(signal, run.sampling, max_frequency_hz), run.sampling, 0.5)
-    (below, slow), (_, amplitude) = spec.slower(), spec.line()
-    return below if 0.0 < amplitude < slow else None
+    return spectrum_of_end(low_passed(signal, run.sampling, max_frequency_hz), run.sampling, 0.5).stronger_below()
 
 
 def spectrum_of_end(filtered: Array, sampling: float, share: float) -> Spectrum:

@@ -165,6 +165,7 @@ def of_countermeasures(result: Countermeasures, value_of: Callable[[str], float]
 
 def of_run(summary: dict[str, Any], *, slides: bool = True) -> Conclusion:
     """What vibrates at the end of a run in time; then both approaches side by side, where bodies slide steadily."""
+    from ..study.run_summary import slower_is_stronger
     from ..temporal.growth import state_of
 
     if summary["dominant_frequency_hz"] is None:
@@ -181,10 +182,7 @@ def of_run(summary: dict[str, Any], *, slides: bool = True) -> Conclusion:
     loudest, below = measured(summary["dominant_frequency_hz"], 1), summary["stronger_below_hz"]
     said = f"last phase: {loudest} Hz {'dominates' if below is None else 'is the strongest line'}, {growth}{state}"
     if below is not None:
-        said += (
-            f"; what swings or drifts below {measured(below, 1)} Hz is stronger, and the second half of the phase is "
-            "too short to tell its frequency: give the phase a longer duration to see it"
-        )
+        said += f"; {slower_is_stronger(below)}"
     return Conclusion(said, "compare" if slides else "")
 
 

@@ -105,8 +105,9 @@ def _show(result: Ensemble) -> None:
     varying = [name for name in ("mu", "load", "speed", "perturbation") if len(np.unique(getattr(result, name))) > 1]
     varying = varying or ["mu"]
     swept = any(result.sweep)
-    heads = [*varying, *(["sweep"] if swept else []), "regime", f"rms [{result.unit}]", "frequency [Hz]", "stick",
-             "slip", "separation", "mode"]  # fmt: skip
+    slower = np.isfinite(result.stronger_below_hz)
+    heads = [*varying, *(["sweep"] if swept else []), "regime", f"rms [{result.unit}]", "frequency [Hz]",
+             *(["stronger below [Hz]"] if slower.any() else []), "stick", "slip", "separation", "mode"]  # fmt: skip
     rows: list[list[str]] = []
     for k in range(min(len(result), MOST_ROWS)):
         shares = [f"{t[k].max():.1%}" if t.shape[1] and np.isfinite(t[k]).all() else "–" for t in
@@ -119,6 +120,7 @@ def _show(result: Ensemble) -> None:
                 result.regime[k],
                 readable(float(result.rms[k]), 4) if known else "–",
                 measured(float(result.frequency_hz[k]), 1) if np.isfinite(result.frequency_hz[k]) else "–",
+                *([measured(float(result.stronger_below_hz[k]), 1) if slower[k] else "–"] if slower.any() else []),
                 *shares,
                 str(result.mode[k]) if result.mode[k] else "–",
             ]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -119,6 +119,7 @@ def _ensemble(dims: tuple[str, ...]) -> dict[str, _Rule]:
         **dict.fromkeys(("stick", "slip", "separation"), share),
         **dict.fromkeys(("rms", "peak", "frequency_hz", "slip_speed", "mode_hz"), positive),
         **{name: _Rule(dims, missing=True) for name in ("growth_rate", "mode_deviation")},
+        "stronger_below_hz": replace(positive, needed=False),  # files of an earlier version have none
         "mode": _Rule(dims, "i", 0),
         **{name: _Rule(dims, "O") for name in ("regime", "error")},
     }

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import AbstractPathEffect, Normal, Stroke
 
 from ..errors import AnalysisError
 from ..typing import Array, BoolArray, IntArray
@@ -26,6 +27,8 @@ AGREES, DIFFERS, OPEN = 1, 0, -1  # of a comparison
 # Its marks: shape, colour and words.
 VERDICTS = {AGREES: ("o", BLUE, "agree"), DIFFERS: ("X", VERMILION, "do not agree"), OPEN: ("o", GREY, "not decided")}
 IN_TIME = {"agree": "x", "do not agree": "X", "not decided": "+"}
+DOMINANT = "dominant frequency [Hz]"
+_OUTLINED: list[AbstractPathEffect] = [Stroke(linewidth=2.2, foreground=INK), Normal()]  # seen on all colours
 EVEN = 1e-6  # of the values: what lies closer is the same but for rounding
 
 
@@ -69,8 +72,8 @@ def analysis_figures(result: StudyResult) -> dict[str, Figure]:
 @styled
 def results_over(result: StudyResult, x: str) -> Figure:
     """The results of all samples over one parameter. Of steady sliding contact forces and shares of the contact nodes;
-    of runs how strongly they vibrate, at which frequency, and shares of time, filled where growth has ended; of
-    comparisons growth rate and frequency of the mode and in time."""
+    of runs how strongly they vibrate, filled where growth has ended, at which frequency, filled where that dominates,
+    and shares of time; of comparisons growth rate and frequency of the mode and in time."""
     panels = _PANELS[result.compute](result)
     figure, axes = stacked(None, len(panels), 0.6 + 2.0 * len(panels))
     at = numbers(result, x)
@@ -168,12 +171,31 @@ def _nodes(result: StudyResult) -> dict[str, Array]:
 def _simulate(result: StudyResult) -> list[_Panel]:
     shares = _states("separation", *(numbers(result, f"{name}_fraction") for name in ("separation", "stick", "slip")))
     panels = [
-        _Panel("dominant frequency [Hz]", (_Line(numbers(result, "dominant_frequency_hz"), "", joined=False),)),
+        _Panel(DOMINANT, _by_dominance(result)),
         _Panel("share of time", shares, share=True),
     ]
     if "velocity_rms" in result.data:  # a store of an earlier version has none
         panels.insert(0, _Panel("velocity, rms [m/s]", _by_growth(result)))
     return panels
+
+
+def _slower(result: StudyResult) -> BoolArray:
+    """In which runs (n,) something slower than their window resolves is stronger than the line; of a store of an
+    earlier version that is not known, and none."""
+    held = "stronger_below_hz" in result.data
+    return np.isfinite(numbers(result, "stronger_below_hz" if held else "dominant_frequency_hz")) & held
+
+
+def _by_dominance(result: StudyResult) -> tuple[_Line, ...]:
+    """At which frequency runs vibrate: filled where it dominates."""
+    frequency, slower = numbers(result, "dominant_frequency_hz"), _slower(result)
+    if not slower.any():
+        return (_Line(frequency, "", joined=False),)
+    every = np.ones(len(slower), dtype=bool)
+    return (
+        _Line(np.where(slower, np.nan, frequency), "nothing slower told", filled=every, joined=False),
+        _Line(np.where(slower, frequency, np.nan), "something slower is stronger", filled=~every, joined=False),
+    )
 
 
 def _by_growth(result: StudyResult) -> tuple[_Line, ...]:
@@ -225,6 +247,9 @@ def maps(result: StudyResult, x: str | None = None, y: str | None = None) -> Fig
         drawn = marks(ax, at, known, c=values[known], cmap="viridis")
         low, high = _colours(values[known], from_zero=share)
         drawn.set_clim(low, high)
+        if label == DOMINANT and (slower := _slower(result)).any():
+            marks(ax, at, slower, c="white", marker="x", lw=1.0, path_effects=_OUTLINED)
+            ax.set_title(f"{label}; ×: slower is stronger")
         even = known.any() and _even(values[known])
         if even:  # one colour, as other ones would be those of nothing
             drawn.set_cmap(ListedColormap([drawn.get_cmap()(0.5 if np.any(values[known]) else 0.0)]))
@@ -280,7 +305,7 @@ def _mapped(result: StudyResult) -> Sequence[tuple[str, Array, bool]]:
     rms = [("velocity, rms [m/s]", numbers(result, "velocity_rms"), False)] if "velocity_rms" in result.data else []
     return (
         *rms,
-        ("dominant frequency [Hz]", numbers(result, "dominant_frequency_hz"), False),
+        (DOMINANT, numbers(result, "dominant_frequency_hz"), False),
         ("share of time in stick", numbers(result, "stick_fraction"), True),
         ("share of time in separation", numbers(result, "separation_fraction"), True),
     )

@@ -17,6 +17,7 @@ from ..modal.growing import doubt
 from ..modal.onset import Onset, Onsets
 from ..modal.results import grows
 from ..study.analyses import compare, modes, onsets, simulate, steady_sliding, summarise
+from ..study.run_summary import slower_is_stronger
 from ..study.workspace import Unsaved, Workspace
 from ..temporal.growth import Growth
 from ..temporal.trajectory import Trajectory
@@ -163,11 +164,13 @@ def _simulate(work: Workspace, mu: float | None, keep: Keep) -> Row:
     found = summarise(work, run)
     row: Row = {
         "dominant_frequency_hz": _number(found.dominant_frequency_hz),
+        "stronger_below_hz": _number(found.stronger_below_hz),
         "velocity_rms": _velocity_rms(run),
         "growth_rate_in_time": _number(found.growth_rate),
         "saturated": _state(found.growth),
         "energy_error": float(found.energy.error),
         "steps": run.steps,
+        "note": "" if found.stronger_below_hz is None else _printable(slower_is_stronger(found.stronger_below_hz)),
     }
     last = run.phases[-1] if run.phases else None
     if last is not None and last.contacts:
@@ -262,7 +265,12 @@ _VARIABLES: dict[str, tuple[StoreColumn, ...]] = {
         StoreColumn("residual", "f8", "1", "largest imbalance over the largest force"),
     ),
     "simulate": (
-        StoreColumn("dominant_frequency_hz", "f8", "Hz", "loudest frequency of the last phase"),
+        StoreColumn("dominant_frequency_hz", "f8", "Hz", "strongest line of the last phase"),
+        StoreColumn(
+            "stronger_below_hz", "f8", "Hz",
+            "frequency below which something is stronger than that and the second half of the phase is too short to "
+            "resolve; none where nothing is",
+        ),
         StoreColumn(
             "velocity_rms", "f8", "m/s", "rms of the velocity that has it about its mean, second half of the last phase"
         ),

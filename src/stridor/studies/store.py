@@ -29,7 +29,8 @@ MARKS = ("zarr.json", ".zgroup")  # of a folder that zarr has written, or an ear
 CHUNK = 512  # rows of a chunk at most
 WHOLE = "every_chunk_written"  # of the attributes: what of computed rows is not there is lost
 COLUMNS = "columns"  # of the attributes: the results that it has
-LATER = ("velocity_rms",)  # results that stores without these attributes may lack: an earlier version wrote none
+# Results that stores without these attributes may lack: an earlier version wrote none.
+LATER = ("velocity_rms", "stronger_below_hz")
 PENDING, DONE, FAILED = 0, 1, 2
 _FILL: Mapping[str, Any] = {"f8": np.nan, "i8": 0, "i1": 0, "str": ""}
 

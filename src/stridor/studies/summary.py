@@ -21,7 +21,10 @@ _NUMBERS = {
     "modes": ("largest_growth_rate", "largest_growth_frequency_hz", "unstable_modes"),
     "onsets": ("critical_mu", "critical_frequency_hz", "onsets"),
     "steady": ("normal_force", "largest_node_force", "open_nodes", "sticking_nodes", "slipping_nodes"),
-    "simulate": ("velocity_rms", "dominant_frequency_hz", "stick_fraction", "slip_fraction", "separation_fraction"),
+    "simulate": (
+        "velocity_rms", "dominant_frequency_hz", "stronger_below_hz", "stick_fraction", "slip_fraction",
+        "separation_fraction",
+    ),
     "compare": ("modal_frequency_hz", "modal_growth_rate", "growth_rate_in_time", "agree"),
 }
 

@@ -30,9 +30,11 @@ from .ensemble_numbers import LEAST_RECORDS, MemberNumbers, Observable, last_pha
 from .ensemble_result import AXES, Ensemble
 from .pressed import require_pressed_in_time
 from .provenance import provenance
+from .run_summary import slower_is_stronger
 from .settings import phases_of, settings_of
 from .workspace import Problem, Workspace
 
+ONE_EACH = ("rms", "peak", "frequency_hz", "stronger_below_hz", "growth_rate")  # numbers of a member, as of the result
 UNSEEN = "what vibrates is rounding, and whether they would grow it does not say; give a perturbation to see it"
 
 Values = float | Sequence[float] | Array | None
@@ -257,7 +259,7 @@ def _result(
     """All rows."""
     count = len(plan.rows)
     names = next((tuple(n.contacts) for n in seen.numbers.values()), ())
-    one = {name: np.full(count, np.nan) for name in ("rms", "peak", "frequency_hz", "growth_rate")}
+    one = {name: np.full(count, np.nan) for name in ONE_EACH}
     shares = {name: np.full((count, len(names)), np.nan) for name in ("stick", "slip", "separation")}
     mode, mode_hz, deviation = np.zeros(count, dtype=np.int64), np.full(count, np.nan), np.full(count, np.nan)
     regime = ["failed" if k in seen.errors else "interrupted" for k in range(count)]
@@ -268,7 +270,8 @@ def _result(
         for name, values in shares.items():
             values[k] = [getattr(c, f"{name}_fraction") for c in numbers.contacts.values()]
         growing = found.at(float(plan.rows[k, 0]), float(plan.rows[k, 2]), float(plan.rows[k, 1]))
-        if growing is not None and numbers.regime in ("steady", "transient", "grows"):
+        responds = numbers.regime in ("steady", "transient", "grows") and np.isnan(numbers.stronger_below_hz)
+        if growing is not None and responds:  # else its line is not what is strongest, and no mode answers to it
             mode[k], mode_hz[k], deviation[k] = growing.nearest(numbers.frequency_hz)
     separate = () if outcome.side_by_side else (f"separate runs, not side by side: {outcome.reason}",)
     separate += (outcome.said,) if outcome.said else ()
@@ -279,6 +282,11 @@ def _result(
     rest = [k for k, name in enumerate(regime) if name == "still" and seen.begun_in_sliding and not plan.rows[k, 3]]
     if rest:
         given = (*given, f"{counted(len(rest), 'member')} without a perturbation stayed in steady sliding: {UNSEEN}")
+    slower = one["stronger_below_hz"][np.isfinite(one["stronger_below_hz"])]
+    if len(slower):
+        said = slower_is_stronger(float(slower.max()), "the window")
+        which = f"the line of {counted(len(slower), 'member')} does not dominate, and no mode is named for it"
+        given = (*given, f"{which}: {said}")
     return Ensemble(
         mu=plan.rows[:, 0], load=plan.rows[:, 1], speed=plan.rows[:, 2], perturbation=plan.rows[:, 3],
         sweep=plan.sweep, slip_speed=plan.rows[:, 2] * float(sliding), observable=seen.observable.name,

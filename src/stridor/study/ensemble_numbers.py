@@ -87,6 +87,7 @@ class MemberNumbers:
     rms: float
     peak: float
     frequency_hz: float
+    stronger_below_hz: float
     growth_rate: float
     regime: str
     contacts: Mapping[str, ContactStatistics]
@@ -96,8 +97,8 @@ def numbers_of(
     run: Trajectory, observable: Observable, max_frequency_hz: float, *, disturbed: bool = True
 ) -> MemberNumbers:
     """The window of a run, its last phase, in numbers; the frequency by way of the phase before it, whose end the
-    filter takes up. disturbed: whether anything brought it out of steady sliding; of rounding neither rate nor
-    frequency is told."""
+    filter takes up, and what is stronger than its line by the same spectrum. disturbed: whether anything brought it out
+    of steady sliding; of rounding neither rate nor frequency is told."""
     window = run.phase_slice()
     signals = observable.signals(run)
     seen = signals[window]
@@ -111,14 +112,18 @@ def numbers_of(
     contacts = run.phases[-1].contacts
     still = max(before, after) <= ROUNDING * float(np.abs(seen).max())
     if not disturbed and _rests(run, window):
-        return MemberNumbers(rms, peak, math.nan, math.nan, "still", contacts)
+        return MemberNumbers(rms, peak, math.nan, math.nan, math.nan, "still", contacts)
     regime = "still" if still else _regime(before, after, contacts.values())
     loudest = int(np.argmax(np.ptp(seen, axis=0)))
     start = run.phase_slice(-2).start if len(run.phases) > 1 else window.start
     share = len(seen) / (window.stop - start)
     filtered = low_passed(signals[start : window.stop, loudest], run.sampling, max_frequency_hz)
-    frequency, amplitude = spectrum_of_end(filtered, run.sampling, share).line()
-    return MemberNumbers(rms, peak, frequency if amplitude > 0.0 else math.nan, rate, regime, contacts)
+    spec = spectrum_of_end(filtered, run.sampling, share)
+    (frequency, amplitude), below = spec.line(), spec.stronger_below()
+    return MemberNumbers(
+        rms, peak, frequency if amplitude > 0.0 else math.nan, math.nan if below is None else below, rate, regime,
+        contacts,
+    )  # fmt: skip
 
 
 def _rests(run: Trajectory, window: slice) -> bool:

@@ -17,11 +17,14 @@ from ..typing import Array, IntArray
 AXES = ("mu", "load", "speed", "perturbation")
 SHARES = ("stick", "slip", "separation")
 HEADS = (
-    *AXES, "sweep", "slip_speed_m_s", "regime", "rms", "peak", "frequency_hz", "growth_1_s", "mode", "mode_hz",
-    "mode_deviation", "error",
+    *AXES, "sweep", "slip_speed_m_s", "regime", "rms", "peak", "frequency_hz", "stronger_below_hz", "growth_1_s",
+    "mode", "mode_hz", "mode_deviation", "error",
 )  # fmt: skip
 REGIMES = ("steady", "transient", "grows", "decays", "linear", "sticks", "still", "failed", "interrupted")
-UNITS = {"slip_speed": "m/s", "frequency_hz": "Hz", "growth_rate": "1/s", "mode_hz": "Hz", "perturbation": "m/s"}
+UNITS = {
+    "slip_speed": "m/s", "frequency_hz": "Hz", "stronger_below_hz": "Hz", "growth_rate": "1/s", "mode_hz": "Hz",
+    "perturbation": "m/s",
+}  # fmt: skip
 
 
 NOT_KNOWN = -1  # unstable modes where nothing was solved
@@ -62,16 +65,19 @@ class Ensemble(Tabular):
     (k,) [m/s]: the largest of the contacts in steady sliding.
 
     Over the window, the last share of the last phase: rms and peak (k,) of the ``observable`` about its mean [unit];
-    frequency_hz (k,) of its largest line; stick, slip, separation (k, m): shares of time, of every step; growth_rate
-    (k,) [1/s] of the rms from one half of it to the other. regime (k,), by these halves: "steady" where contacts
-    change between stick, slip and separation and the rms of both is the same within 10 %, "transient" where it is not.
-    Without such changes contacts that slip leave the motion linear: it "grows" or "decays" by more than that, or is
-    "linear"; "sticks" where none slips, "still" where nothing vibrates, or nothing has disturbed steady
-    sliding and what is left is rounding (growth_rate, frequency_hz: NaN); "failed" (error says why) or "interrupted".
+    frequency_hz (k,) of its largest line, and stronger_below_hz (k,) below which something is stronger than that line
+    and too slow for the window to tell its frequency (NaN: nothing is, and the line dominates); stick, slip, separation
+    (k, m): shares of time, of every step; growth_rate (k,) [1/s] of the rms from one half of it to the other. regime
+    (k,), by these halves: "steady" where contacts change between stick, slip and separation and the rms of both is the
+    same within 10 %, "transient" where it is not. Without such changes contacts that slip leave the motion linear: it
+    "grows" or "decays" by more than that, or is "linear"; "sticks" where none slips, "still" where nothing vibrates, or
+    nothing has disturbed steady sliding and what is left is rounding (growth_rate, frequency_hz: NaN); "failed" (error
+    says why) or "interrupted".
 
     mode (k,): number, as in `modes`, of the unstable mode that responds, the nearest one to the frequency if it is
     within 5 % of it, else 0; mode_hz, mode_deviation (k,): frequency of the nearest and how far off the run is,
-    f/f_mode − 1; only of members that are steady or transient or grow. NaN is what does not exist.
+    f/f_mode − 1; only of members that are steady or transient or grow, and whose line dominates. NaN is what does not
+    exist.
 
     axes: the values along each of mu, load, speed, perturbation, if members are all combinations of these, in that
     order, up before down; else (). modal: the modal map, None where it was not asked for or cannot be told. runs: the
@@ -90,6 +96,7 @@ class Ensemble(Tabular):
     rms: Array
     peak: Array
     frequency_hz: Array
+    stronger_below_hz: Array
     stick: Array
     slip: Array
     separation: Array
@@ -155,7 +162,7 @@ class Ensemble(Tabular):
         heads = (*HEADS, *shares)
         rows: list[tuple[Cell, ...]] = []
         for k in range(len(self)):
-            numbers = [self.rms, self.peak, self.frequency_hz, self.growth_rate]
+            numbers = [self.rms, self.peak, self.frequency_hz, self.stronger_below_hz, self.growth_rate]
             tables = (self.stick, self.slip, self.separation)
             fractions = [t[k, c] for c in range(len(self.contact_names)) for t in tables]
             rows.append(
@@ -191,11 +198,16 @@ class Ensemble(Tabular):
         return f"{counted(len(self), 'member')}, {self.how}: {told}"
 
     def _repr_html_(self) -> str:
-        heads = ("μ", "load", "speed", "sweep", "regime", f"rms [{self.unit}]", "frequency [Hz]", "mode")
+        heads = (
+            "μ", "load", "speed", "sweep", "regime", f"rms [{self.unit}]", "frequency [Hz]", "stronger below [Hz]",
+            "mode",
+        )  # fmt: skip
         rows = [
             (
                 readable(self.mu[k], 4), readable(self.load[k], 4), readable(self.speed[k], 4), self.sweep[k],
-                self.regime[k], readable(self.rms[k], 4), readable(self.frequency_hz[k], 5), int(self.mode[k]) or "–",
+                self.regime[k], readable(self.rms[k], 4), readable(self.frequency_hz[k], 5),
+                readable(self.stronger_below_hz[k], 5) if np.isfinite(self.stronger_below_hz[k]) else "–",
+                int(self.mode[k]) or "–",
             )
             for k in range(min(len(self), MOST_ROWS))
         ]  # fmt: skip
@@ -213,7 +225,10 @@ class Ensemble(Tabular):
             coords["sweep"] = ("sweep", np.array(list(dict.fromkeys(self.sweep)), dtype=object))
         else:
             one_by_one = {name: getattr(self, name) for name in AXES}
-        own = ("slip_speed", "rms", "peak", "frequency_hz", "growth_rate", "mode", "mode_hz", "mode_deviation")
+        own = (
+            "slip_speed", "rms", "peak", "frequency_hz", "stronger_below_hz", "growth_rate", "mode", "mode_hz",
+            "mode_deviation",
+        )  # fmt: skip
         numbers = one_by_one | {name: getattr(self, name) for name in own}
         units = UNITS | {"rms": self.unit, "peak": self.unit}
         variables: dict[str, Any] = {

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..agreement import dominant_response, linear_part, stronger_below
 from ..asking import takes
-from ..digits import hertz
+from ..digits import hertz, measured
 from ..notebook import Shown
 from ..sliding import full_motion, slip_speeds
 from ..temporal.attractor import settled_contacts
@@ -102,6 +102,15 @@ class RunSummary(Shown):
             "changed": changes_of(run),
             "restarts": run.provenance.get("restarts", []),
         }
+
+
+def slower_is_stronger(below_hz: float, seen: str = "the second half of the phase") -> str:
+    """What is to be said of the strongest line of what is seen of a run, where below a frequency [Hz] something is
+    stronger (`stronger_below_hz`)."""
+    return (
+        f"what swings or drifts below {measured(below_hz, 1)} Hz is stronger, and {seen} is too short to tell its "
+        "frequency: give the phase a longer duration to see it"
+    )
 
 
 def first_regime(run: Trajectory) -> dict[str, dict[str, float | None]]:

@@ -72,6 +72,12 @@ class Spectrum:
         first = min(self._first, len(self.frequency_hz) - 1)
         return float(self.frequency_hz[first]), float(self.amplitude[1:first].max(initial=0.0))
 
+    def stronger_below(self) -> float | None:
+        """Frequency [Hz] below which something swings or drifts that is stronger than the largest line, and that the
+        signal is too short to resolve; None where there is no such thing, or no line."""
+        (below, slow), (_, amplitude) = self.slower(), self.line()
+        return below if 0.0 < amplitude < slow else None
+
 
 def _interpolated(frequency: Array, amplitude: Array, k: int) -> float:
     """Vertex of the parabola through the logarithms of three bins."""

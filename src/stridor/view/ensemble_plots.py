@@ -64,7 +64,8 @@ def _shown(result: Ensemble) -> _Shown:
 def ensemble_map(result: Ensemble) -> Figure:
     """Amplitude, dominant frequency, shares of stick and of separation over the numbers that vary, and below over μ how
     many modes grow and the frequency of the fastest. Members without a ring in their amplitude are not steady; a
-    number at the frequency is that of the unstable mode that responds, left out where cells are too small for it."""
+    number at the frequency is that of the unstable mode that responds, left out where cells are too small for it; a
+    cross, that something slower than the window resolves is stronger than the line at it."""
     shown = _shown(result)
     pages = shown.branches if len(shown.names) == 2 else ("",)
     modal = result.modal is not None
@@ -89,6 +90,7 @@ def ensemble_map(result: Ensemble) -> Figure:
                 _lines(ax, shown, table, share=k > 1)
             if k < 2:
                 marks.append((_rings, _numbers)[k](ax, shown, number))
+        marks.append(_crosses(panels[2 * number, 1], shown, number))
     if modal:
         _modal(panels[-1, 0], panels[-1, 1], result)
     _headed(figure, shown, marks)
@@ -184,6 +186,23 @@ def _rings(ax: Axes, shown: _Shown, page: int) -> str:
                 (ring,) = ax.plot(x, y, "o", mfc="none", mec="white" if two else INK, ms=size, mew=edge)
                 ring.set_path_effects([Stroke(linewidth=2.2 * edge, foreground=INK), Normal()] if two else [])
                 words = "ring: steady"
+    return words
+
+
+def _crosses(ax: Axes, shown: _Shown, page: int) -> str:
+    """A cross at the frequency of each member in which something slower is stronger, no larger than its cell; what it
+    means, "" where there is none."""
+    two, slower = len(shown.names) == 2, np.isfinite(shown.result.stronger_below_hz)
+    size, words = min(6.0, max(0.4 * _room(ax, shown), 0.0 if two else 5.0)), ""
+    frequency = shown.result.frequency_hz / _frequencies(shown.result)[0]
+    for branch in [page] if two else range(len(shown.branches)):
+        for where in np.ndindex(shown.members[branch].shape):
+            k = int(shown.members[branch][where])
+            if slower[k]:
+                x, y = _at(shown, where, frequency[k])
+                (cross,) = ax.plot(x, y, "x", color="white" if two else INK, ms=size, mew=1.2 * size / 6.0)
+                cross.set_path_effects([Stroke(linewidth=2.4 * size / 6.0, foreground=INK), Normal()] if two else [])
+                words = "cross: something too slow for the window is stronger"
     return words
 
 
