@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ....contact.nodes import ContactNodes, stack
-from ....contact.obstacles import Cylinder, Flat
+from ....contact.obstacles import Cylinder
 from ....contact.pairing import repair
 from ....contact.surfaces import SurfaceContact
 from ....system import System
@@ -135,7 +135,7 @@ def steps_to_renewal(machine: Machine, distances: Array, last: int) -> int:
     for k, surface in enumerate(machine.system.surfaces):
         if surface.sliding == "finite":
             mine = nodes.owner == points + k
-            most_way = np.inf if isinstance(surface.master, Cylinder | Flat) else SLIDE * distances[k]
+            most_way = np.inf if isinstance(surface.master, Cylinder) else SLIDE * distances[k]
             for fastest, most in ((speed[mine], most_way), (turned[mine], TURN)):
                 rate = float(fastest.max(initial=0.0)) * machine.scheme.step
                 if rate > 0.0 and np.isfinite(most):
