@@ -78,7 +78,7 @@ def _frictions(study: Study, case: Case, samples: Array) -> list[float | None]:
         found = _three(np.unique([low, (low + high) / 2, high]))
     else:
         return [None]
-    return sorted(found, reverse=True)
+    return [*sorted(found, reverse=True)]
 
 
 def _elsewhere(study: Study, case: Case, samples: Array, path: str) -> list[Case] | None:
