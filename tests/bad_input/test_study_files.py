@@ -277,3 +277,9 @@ def test_names_of_the_parameters_of_the_case_stand_for_their_values(case: st.Cas
         st.Study(case=named, sampling=RANDOM, parameters={"b": NORMAL})
     with pytest.raises(CaseError, match=r"^a: an entry of \[parameters\], whose value is parameters\.a\.value$"):
         st.sensitivities(named, ["a"])
+
+
+def test_a_parameter_that_is_set_but_is_none_of_the_study_is_refused_with_those_of_the_study() -> None:
+    text = 'case = "case.toml"\nparameters.k1.values = [1.0, 2.0]\nparameters.mu.values = [0.1]\n'
+    with pytest.raises(CaseError, match=r"^parameters\.zeta: no such parameter; the study has: k1, mu$"):
+        st.Study.loads(text, ["parameters.zeta.range=[0,1]"])

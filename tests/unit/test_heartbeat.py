@@ -179,3 +179,21 @@ def test_a_time_loop_says_how_far_it_is(monkeypatch: pytest.MonkeyPatch) -> None
     said = [now for now in told if now.what.startswith("time loop, ")]
     assert said[-1].what == "time loop, 100 of 100 steps"
     assert {now.began for now in said} == {next(n.began for n in told if n.what.startswith("time loop; "))}
+
+
+def test_the_time_left_is_that_of_rows_without_what_comes_before_the_first(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Workers start and make the model for 90 s; then a row takes 0.5 s."""
+    now = 1000.0
+    monkeypatch.setattr(output.time, "monotonic", lambda: now)
+    with output.counting("study", quiet=False) as progress:
+        progress(200, 1000)  # those of an earlier run
+        now += 90.0
+        for done in range(201, 1001):
+            progress(done, 1000)
+            now += 0.5
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "study: 221 of 1000, about 6.5 min left"
+    assert len(lines) == 39  # one every 10 s
+    assert lines[-1] == "study: 981 of 1000, about 9.5 s left"

@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 
 import stridor as st
+from matrix_cases import matrix_case
 from mode_coupling import mode_coupling
 from program import stridor
 from stridor.app.conclusions import of_onsets
@@ -53,6 +54,54 @@ def test_speeds_and_numbers_of_a_falling_law_have_an_effect(case: st.Case) -> No
     assert told(case, "modes", law) == []
     assert told(case, "modes", law, mu={"values": (0.0, 0.3)}) == []
     assert told(case, "onsets", law) == []
+
+
+def two_masses(folder: Path, factor: str, names: str, more: str = "") -> st.Case:
+    """Two masses with springs, and a stiffness of one to the other whose factor is given; names have the value 2."""
+    eye, across = np.eye(2), np.array([[0.0, 1.0], [0.0, 0.0]])
+    terms = [(eye, "mass", ""), (np.diag([4.0, 5.0]), "stiffness", ""), (across, "stiffness", factor), (across.T, "stiffness", "0.5")]
+    return matrix_case(folder, terms, 2.0, (0.0, 3.0), more + "\n[parameters]\n" + "".join(f"{name} = {{ value = 2.0 }}\n" for name in names))
+
+
+def idle_of(case: st.Case, compute: str, mu: tuple[float, ...] = (), seed: int = 0, **varied: tuple[float, ...]) -> list[str]:
+    """Names of the case's own parameters of which a study says that they have no effect."""
+    parameters = {f"parameters.{name}.value": {"values": values} for name, values in varied.items()}
+    parameters |= {"mu": {"values": mu}} if mu else {}
+    study = st.Study(case=case, compute=compute, parameters=parameters, sampling={"seed": seed})
+    return [line.split(".")[1] for line in without_effect(study, case, samples(study))]
+
+
+@pytest.mark.parametrize(
+    ("compute", "mu"),
+    [("onsets", ()), ("modes", (0.3, 0.8)), ("modes", (0.0, 0.8)), ("simulate", (0.0, 0.3)), ("compare", (0.0, 0.3))],
+)
+def test_what_only_friction_brings_into_the_matrices_has_an_effect(
+    compute: str, mu: tuple[float, ...], tmp_path: Path
+) -> None:
+    """Of 0.5 − μf nothing of f is left at μ = 0, which matrices have that nothing gives another friction."""
+    case = two_masses(tmp_path, "0.5 - mu*f", "fgh")
+    assert idle_of(case, compute, mu, f=(1.0, 3.0)) == []
+    assert idle_of(case, compute, mu, f=(1.0, 3.0), g=(1.0, 3.0), h=(1.0, 3.0)) == ["g", "h"]
+
+
+def test_friction_of_the_case_itself_counts_where_nothing_else_gives_it(tmp_path: Path) -> None:
+    case = two_masses(tmp_path, "0.5 - mu*f", "fg")
+    assert idle_of(case, "modes", f=(1.0, 3.0), g=(1.0, 3.0)) == ["f", "g"]  # at μ = 0, as its rows are
+    rubs = case.with_({"parameters.mu": {"value": 0.3}})
+    assert idle_of(rubs, "modes", f=(1.0, 3.0), g=(1.0, 3.0)) == ["g"]
+    still = case.with_({"parameters.mu": {"value": 0.0}})
+    named = {"parameters.mu.value": {"values": (0.0, 0.8)}, "parameters.f.value": {"values": (1.0, 3.0)}}
+    study = st.Study(case=still, parameters=named)
+    assert without_effect(study, still, samples(study)) == []
+
+
+def test_a_number_is_tried_between_its_ends_and_with_others_that_are_not_zero(tmp_path: Path) -> None:
+    case = two_masses(tmp_path, "0.5 + (f-1)*(f-3)*g", "fg")
+    assert idle_of(case, "modes", f=(1.0, 2.0, 3.0)) == []
+    assert idle_of(case, "modes", f=(1.0, 3.0)) == ["f"]  # and no row has another
+    still = case.with_({"parameters.g.value": 0.0})
+    for seed in range(4):  # of the sample looked at, in which g is 0 or 1
+        assert idle_of(still, "modes", seed=seed, f=(1.0, 2.0, 4.0), g=(0.0, 1.0)) == []
 
 
 def test_modes_keep_their_numbers_in_rows_confirmed_in_full(tmp_path: Path) -> None:

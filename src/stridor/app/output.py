@@ -159,14 +159,20 @@ class _Lines:
     """Progress as lines of a log."""
 
     def __init__(self, text: str) -> None:
-        self.text, self.last = text, time.monotonic()
+        self.text, self.last = text, 0.0
+        self.first: int | None = None
         self.before: tuple[float, int] | None = None
 
     def __call__(self, done: int, planned: int) -> None:
         now = time.monotonic()
+        if self.first is None:
+            self.first = done
+        if self.before is None and done > self.first:
+            # What came before, a model, factors or workers that start, and with the first of them what is made once
+            # for all, is no measure of what comes now.
+            self.before, self.last = (now, done), now
         if self.before is None:
-            # What came before the first word, a model or factors, is no measure of what comes now.
-            self.before = now, done
+            return
         started, first = self.before
         if now - self.last < BETWEEN_LINES or not first < done < planned:
             return

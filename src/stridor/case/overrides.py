@@ -56,19 +56,20 @@ def split_path(path: str) -> tuple[str, ...]:
     return steps
 
 
-def override(data: dict[str, Any], overrides: Iterable[str]) -> list[Problem]:
-    """Apply overrides to the data of a case, in place and in turn; returns what could not be applied."""
+def override(data: dict[str, Any], overrides: Iterable[str], *, of: str = "case") -> list[Problem]:
+    """Apply overrides to the data of a case, in place and in turn; returns what could not be applied. of: what the data
+    are called in words, "study" for those of one."""
     problems: list[Problem] = []
     for text in overrides:
         try:
             path, value = parse_override(text)
-            problems.extend(apply(data, split_path(path), value))
+            problems.extend(apply(data, split_path(path), value, of=of))
         except CaseError as error:
             problems.extend(error.problems)
     return problems
 
 
-def apply(data: dict[str, Any], path: tuple[str, ...], value: object) -> list[Problem]:
+def apply(data: dict[str, Any], path: tuple[str, ...], value: object, *, of: str = "case") -> list[Problem]:
     """Set the value at a path, in place; None removes it. Returns the problem if the path leads nowhere.
 
     A key that the schema does not know is set all the same: checking the whole then says what is accepted.
@@ -93,7 +94,7 @@ def apply(data: dict[str, Any], path: tuple[str, ...], value: object) -> list[Pr
             if last:
                 _put(table, step, value)
             elif depth == 1 and section in SINGULAR and step not in table:
-                return [Problem(here, None, no_such(SINGULAR[section], step, table))]
+                return [Problem(here, None, no_such(SINGULAR[section], step, table, of))]
             else:
                 node = table.setdefault(step, {})
         else:

@@ -146,9 +146,9 @@ def boundary_names(body: SolidBody) -> tuple[str, ...]:
     return names
 
 
-def no_such(kind: str, name: str, known: Iterable[str]) -> str:
-    """Say "no such body; did you mean 'beam1'? the case has: beam1, beam2"."""
-    return f"no such {kind}{choice(name, known, 'the case has')}"
+def no_such(kind: str, name: str, known: Iterable[str], of: str = "case") -> str:
+    """Say "no such body; did you mean 'beam1'? the case has: beam1, beam2"; of: what it is that has them."""
+    return f"no such {kind}{choice(name, known, f'the {of} has')}"
 
 
 def choice(word: str, known: Iterable[str], introduction: str) -> str:

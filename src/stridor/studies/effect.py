@@ -14,7 +14,7 @@ from ..errors import StridorError
 from ..modal.full.family import deviation
 from ..modal.krylov.problem import problem_of
 from ..modal.quadratic import Quadratic
-from ..study.workspace import Unsaved
+from ..study.workspace import Unsaved, Workspace
 from ..system import System, build_system
 from ..typing import Array
 from .checks import FRICTION
@@ -22,6 +22,7 @@ from .schema import Study
 
 SETTINGS = ("modal", "temporal", "comparison", "phases", "steady")  # change what is computed, not the model
 IN_TIME = ("simulate", "compare")
+ROLES = ("mass", "damping", "stiffness")
 TRIES = 3  # samples, until one makes a model
 SAME = 1e-12  # of the largest of a row and a column: matrices no further apart are the same
 _SKIPPED = {"answers", "of_matrices", "stress_stiffness", "line_rows"}
@@ -29,99 +30,134 @@ _SKIPPED = {"answers", "of_matrices", "stress_stiffness", "line_rows"}
 
 def without_effect(study: Study, case: Case, samples: Array) -> list[str]:
     """Sentences about parameters that leave mass, damping, stiffness, contacts, loads and motions as they are, and so
-    every row, or that leave the matrices of the modes so: with the others as in the case, and as in one sample, as a
-    number that is multiplied by one that the case has as zero changes nothing there alone. None where a model cannot be
-    built: its rows say so."""
+    every row, or that leave the matrices of the modes so: at their least, a middle and their largest value and at the
+    friction that counts, with the others as in the case and elsewhere, as a number that is multiplied by one that the
+    case, the friction or a sample has as zero changes nothing there alone. None where that cannot be looked at."""
     told: list[str] = []
-    friction: float | None = None
-    if FRICTION in study.parameters:
-        # The largest: without friction nothing of its laws is left, and neither would be an effect.
-        friction = float(samples[:, list(study.parameters).index(FRICTION)].max())
+    frictions = _frictions(study, case, samples)
     for k, path in enumerate(study.parameters):
         table = path.split(".", 1)[0]
         values = np.unique(samples[:, k])
         if len(values) == 1:
             told.append(f"{path} has the one value {values[0]:g} in all samples")
             continue
-        if path == FRICTION or (table in SETTINGS and not _idle(table, study)):
+        if path == FRICTION or (table in SETTINGS and not _idle(path, study)):
             continue
         if table in SETTINGS:
             told.append(f"{path} has no effect on {study.compute}: it changes nothing of the model")
             continue
-        ends = float(values[0]), float(values[-1])
-        if _same_model(case, path, *ends):
-            sampled = _at_a_sample(study, case, samples, path)
-            if sampled is None or _same_model(sampled, path, *ends):
-                told.append(f"{path} has no effect on {study.compute}: it changes nothing of the model")
-        elif study.compute in ("modes", "onsets") and _same_modes(study, case, path, values, friction):
-            sampled = _at_a_sample(study, case, samples, path)
-            if sampled is None or _same_modes(study, sampled, path, values, friction):
-                same_there = "the matrices of the modes are the same at both ends and in the middle"
-                others = "" if sampled is None else ", the others as in the case and as in a sample"
-                told.append(f"{path} has no effect on {study.compute}: {same_there}{others}")
+        tried = _three(values)
+        same_model, by_modes = _same_model(case, path, tried, frictions), study.compute in ("modes", "onsets")
+        if not same_model and not (by_modes and _same_modes(case, path, tried, frictions)):
+            continue
+        others = _elsewhere(study, case, samples, path)
+        if others is None:
+            continue
+        if same_model and all(_same_model(other, path, tried, frictions) for other in others):
+            told.append(f"{path} has no effect on {study.compute}: it changes nothing of the model")
+        elif by_modes and all(_same_modes(one, path, tried, frictions) for one in (case, *others)):
+            same_there = "the matrices of the modes are the same at both ends and in the middle"
+            with_others = ", the others as in the case and as in a sample" if others else ""
+            told.append(f"{path} has no effect on {study.compute}: {same_there}{with_others}")
     return told
 
 
-def _at_a_sample(study: Study, case: Case, samples: Array, path: str) -> Case | None:
-    """The case with all parameters but this one, and but friction, as in one of the samples (n, p); None where there is
-    no other, and where none of a few makes a case."""
-    others = [k for k, name in enumerate(study.parameters) if name not in (path, FRICTION)]
+def _three(values: Array) -> list[float]:
+    """The least, the largest and a middle one of values (k,), ascending; of two the two."""
+    return [float(values[k]) for k in dict.fromkeys((0, len(values) - 1, len(values) // 2))]
+
+
+def _frictions(study: Study, case: Case, samples: Array) -> list[float | None]:
+    """The friction coefficients that rows are computed at: least, largest and middle of those that the samples name or
+    that onsets are solved for between, the largest first, as without friction nothing that is multiplied by it shows;
+    None for the case's own."""
+    if FRICTION in study.parameters:
+        found = _three(np.unique(samples[:, list(study.parameters).index(FRICTION)]))
+    elif study.compute == "onsets":
+        low, high = case.modal.friction_range
+        found = _three(np.unique([low, (low + high) / 2, high]))
+    else:
+        return [None]
+    return [*sorted(found, reverse=True)]
+
+
+def _elsewhere(study: Study, case: Case, samples: Array, path: str) -> list[Case] | None:
+    """The case with all parameters, but this one, friction and idle settings, as in one of the samples (n, p) and at a
+    point of no special numbers between them; where that makes no case, as in a few samples. Empty where there is no
+    other parameter; None where none of the samples tried makes a case."""
     names = list(study.parameters)
+    others = [k for k, name in enumerate(names) if name not in (path, FRICTION) and not _idle(name, study)]
     if not others:
-        return None
-    for row in np.random.default_rng(study.sampling.seed).permutation(len(samples))[:TRIES].tolist():
-        try:
-            found = case.with_({names[k]: float(samples[row, k]) for k in others})
-            build_system(found)
-        except StridorError:
-            continue
-        return found
-    return None
+        return []
+    generator = np.random.default_rng(study.sampling.seed)
+    order = generator.permutation(len(samples))[:TRIES]
+    share = generator.random(samples.shape[1])  # a sample may have as zero what others have not
+    low, high = samples.min(axis=0), samples.max(axis=0)
+    between = _at(case, {names[k]: float(low[k] + share[k] * (high[k] - low[k])) for k in others})
+    found: list[Case] = []
+    for row in order.tolist():
+        sampled = _at(case, {names[k]: float(samples[row, k]) for k in others})
+        if sampled is not None and between is not None:
+            return [sampled, between]
+        found += [] if sampled is None else [sampled]
+    return found or None
 
 
-def _same_modes(study: Study, case: Case, path: str, values: Array, friction: float | None) -> bool:
-    """Whether the matrices that modes follow from are the same at the least, a middle and the largest value."""
-    tried = [float(values[k]) for k in sorted({0, len(values) // 2, len(values) - 1})]
+def _at(case: Case, values: Mapping[str, float]) -> Case | None:
+    """The case with these values; None where a model cannot be built."""
     try:
-        first, *others = (_matrices(study, case.with_({path: value}), friction) for value in tried)
+        found = case.with_(values)
+        build_system(found)
     except StridorError:
-        return False
-    roles = ("mass", "damping", "stiffness")
-    pairs = [
-        (getattr(one, role), getattr(two, role))
-        for other in others
-        for one, two in zip(first, other, strict=True)
-        for role in roles
-    ]
-    return all(one.shape == two.shape and deviation(one, two) <= SAME for one, two in pairs)
-
-
-def _matrices(study: Study, case: Case, friction: float | None) -> list[Quadratic]:
-    """M, D, K with what contacts and friction add, at the friction coefficients that count."""
-    work = Unsaved(case)
-    mu = work.own_friction if friction is None else friction
-    low, high = case.modal.friction_range
-    at = [low, (low + high) / 2, high] if study.compute == "onsets" else [work.one_friction() if mu is None else mu]
-    found: list[Quadratic] = []
-    for one in at:
-        system = work.system(one)
-        system = system if case.modal.damped or not system.symmetric_definite else system.undamped()
-        found.append(problem_of(system, one, work.options).pencil(one).condensed())
+        return None
     return found
 
 
-def _idle(table: str, study: Study) -> bool:
-    """Whether a table of settings has no part in what is computed."""
-    in_time = study.compute in IN_TIME
+def _same_modes(case: Case, path: str, tried: list[float], frictions: list[float | None]) -> bool:
+    """Whether the matrices that modes follow from are the same at all values, at each of the friction coefficients."""
+    try:
+        works = [Unsaved(case.with_({path: value})) for value in tried]
+        for mu in frictions:
+            first = _matrices(works[0], mu)
+            if not all(_alike(first, _matrices(work, mu)) for work in works[1:]):
+                return False
+    except StridorError:
+        return False
+    return True
+
+
+def _alike(first: Quadratic, other: Quadratic) -> bool:
+    """Whether the matrices are the same but for rounding."""
+    pairs = [(getattr(first, role), getattr(other, role)) for role in ROLES]
+    return all(one.shape == two.shape and deviation(one, two) <= SAME for one, two in pairs)
+
+
+def _matrices(work: Workspace, mu: float | None) -> Quadratic:
+    """M, D, K with what contacts and friction add, at a friction coefficient; None for the case's own."""
+    one = work.one_friction() if mu is None else mu
+    system = work.system(one)
+    system = system if work.modal.damped or not system.symmetric_definite else system.undamped()
+    return problem_of(system, one, work.options).pencil(one).condensed()
+
+
+def _idle(path: str, study: Study) -> bool:
+    """Whether a parameter is of a table of settings that has no part in what is computed."""
+    table, in_time = path.split(".", 1)[0], study.compute in IN_TIME
     return (table in ("temporal", "phases") and not in_time) or (table == "comparison" and study.compute != "compare")
 
 
-def _same_model(case: Case, path: str, low: float, high: float) -> bool:
+def _same_model(case: Case, path: str, tried: list[float], frictions: list[float | None]) -> bool:
+    """Whether the systems are the same at all values, at each of the friction coefficients: those of contacts are
+    compared as numbers of their laws, those in factors of imported matrices by what they make of these."""
     try:
-        one, other = (build_system(case.with_({path: value})) for value in (low, high))
+        cases = [case.with_({path: value}) for value in tried]
+        for mu in frictions if FRICTION in case.factor_names else [None]:
+            first = build_system(cases[0], mu)
+            if not all(same(first, build_system(other, mu)) for other in cases[1:]):
+                return False
     except StridorError:
         return False
-    return same(one, other)
+    return True
 
 
 def same(one: Any, other: Any) -> bool:

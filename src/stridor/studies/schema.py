@@ -118,7 +118,7 @@ class Study(Shown, Table):
             raise CaseError(source, None, 'empty; a study needs case = "…" and a table [parameters."PATH"]')
         if "bodies" in data:
             raise CaseError(source, None, 'is a case file, not a study; a study names it: case = "FILE.toml"')
-        if problems := override(data, overrides):
+        if problems := override(data, overrides, of="study"):
             raise CaseError.many(problems)
         if isinstance(data.get("case"), str) and folder is not None:
             data["case"] = str(folder / data["case"])

@@ -13,7 +13,7 @@ from ...typing import Array, Sparse
 from .problem import ContactProblem
 
 LARGEST = 1.5e9  # bytes of factors that are kept
-APART = 0.25  # of the largest distance between squares: how far from each of them one is that divides them
+APART = 0.25  # of the widest gap between squares: how far from each of them one is that divides them
 
 
 @dataclass(frozen=True)
@@ -75,15 +75,14 @@ class KeptFactors:
         if made.factor.memory_bytes <= LARGEST:
             self._kept[use] = made
 
-    def dividing(self, squares: Array, first: int) -> float | None:
-        """The ω² at which eigenvalues were counted before, where it is well between two of ``squares`` (k,), ascending,
-        of which those before ``first`` do not count."""
+    def dividing(self, gaps: Array) -> float | None:
+        """The ω² at which eigenvalues were counted before, where it is well within one of the ``gaps`` (g, 2) between
+        them, the widest first."""
         known = self._kept.get("counting")
-        distances = np.diff(squares[first:])
-        if known is None or not len(distances):
+        if known is None or not len(gaps):
             return None
-        clear = np.abs(squares - known.square).min() >= APART * float(distances.max())
-        return known.square if clear and squares[first] < known.square < squares[-1] else None
+        clear = np.minimum(known.square - gaps[:, 0], gaps[:, 1] - known.square)
+        return known.square if clear.max() >= APART * float(gaps[0, 1] - gaps[0, 0]) else None
 
 
 def matrix_at(problem: ContactProblem, square: float) -> tuple[Sparse, float]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from ...direct import factorise
+from ...direct import SingularMatrix, factorise
 from ...errors import AnalysisError, FollowingError
 from ...stages import passing, stage
 from ...typing import Array, BoolArray, ComplexArray, IntArray, Sparse
@@ -30,6 +30,8 @@ LARGEST_REST = 1e-4  # and what it may leave of the lumped inertia forces
 SWEEPS = 40
 IDLE = 4  # sweeps in a row that do not halve what is left: it is rounding
 RUINED = 1e4  # times the least that was left: the basis has taken rounding in
+APART = 1e-6  # of ω²: between modes this far from one another can be counted
+TRIES = 3  # places to count at
 COUNTED = 20_000  # freedoms up to which the number of frictionless modes is checked, by one more factorisation
 GROWN = 1.4  # a basis this much larger than when it was last reduced is reduced again
 MARGIN = 1.1  # modes up to this much above the band are made exact
@@ -107,18 +109,32 @@ class _ModeCount:
 def _counted(
     problem: ContactProblem, squares: Array, top: float, kept: KeptFactors | None = None
 ) -> _ModeCount | None:
-    """The number of frictionless modes, known without finding them, beside ω² (k,) found; None where it is not told."""
-    first = int(np.searchsorted(squares, top**2, side="right"))
-    if len(squares) - first < 2:
+    """The number of frictionless modes, known without finding them, beside ω² (k,) found, ascending; None where it is
+    not told."""
+    gaps = _gaps(squares, top)
+    if not len(gaps):
         return None
-    between = None if kept is None else kept.dividing(squares, first)
-    if between is None:
-        # Between the two modes that are furthest apart, so that rounding does not decide which side they are on.
-        k = first + int(np.argmax(np.diff(squares[first:])))
-        between = float(squares[k] + squares[k + 1]) / 2
-    found = int(np.searchsorted(squares, between))
-    number = modes_below(problem, between, kept)
-    return None if number is None else _ModeCount(number, found, float(np.sqrt(squares[found - 1])) / (2 * np.pi))
+    known = None if kept is None else kept.dividing(gaps)
+    for between in [*gaps.mean(axis=1).tolist()[:TRIES]] if known is None else [known]:
+        try:
+            number = modes_below(problem, between, kept)
+        except SingularMatrix:
+            continue  # a mode that was not found lies there: the next gap has it on one side
+        if number is None:
+            return None
+        return _ModeCount(number, int(np.searchsorted(squares, between)), float(np.sqrt(between)) / (2 * np.pi))
+    return None
+
+
+def _gaps(squares: Array, top: float) -> Array:
+    """Intervals (g, 2) of ω² above the band in which none of ``squares`` (k,), ascending, lies, the widest first. Modes
+    of one frequency differ by rounding and have none between them: it would decide on which side they are. Where there
+    is none above the band, that from it to where the first would be sought."""
+    above = squares[squares > top**2]
+    ends = np.concatenate([[top**2], above if len(above) else [(GUARD * top) ** 2]])
+    gaps = np.column_stack([ends[:-1], ends[1:]])
+    gaps = gaps[np.diff(gaps)[:, 0] > APART * gaps[:, 1]]
+    return gaps[np.argsort(gaps[:, 0] - gaps[:, 1], kind="stable")]
 
 
 def wanted(reduced: Reduced, found: Eigenpairs) -> IntArray:
