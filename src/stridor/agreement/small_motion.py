@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..temporal.signals import SHARE, Components
 from ..temporal.trajectory import Trajectory
-from ..typing import Array
+from ..typing import Array, ComplexArray
 from .shapes import TimeShape
 
 PERTURBATION = 1e-5  # of the slip speed, at the start
@@ -26,7 +26,8 @@ class Perturbation:
     the signal (slip speed minus its steady value) [m/s] where it is linear, its sampling [s], and every
     component found in it. shape: how nodes move in the fastest, None where it was not asked for or cannot be told.
     untold: why the signal does not tell the fastest apart from the others, "" where it does. left: whether it grew out
-    of the linear range, grown: within the frequency range, by whichever component."""
+    of the linear range, grown: within the frequency range, by whichever component. unshown: λ (j,) of modes in which no
+    contact slips, so that the motion was begun without them."""
 
     mu: float
     eigenvalue: complex
@@ -37,6 +38,7 @@ class Perturbation:
     untold: str = ""
     left: bool = False
     grown: bool = False
+    unshown: ComplexArray = field(default_factory=lambda: np.zeros(0, dtype=complex))
 
     @property
     def growth_rate(self) -> float:
