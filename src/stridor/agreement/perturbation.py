@@ -31,7 +31,7 @@ from ..threads import one_thread
 from ..typing import Array, ComplexArray, IntArray, Sparse
 from .pairs import second_of, silent_pairs, slip_of
 from .shapes import component_shape, node_rows
-from .small_motion import DIED, LINEAR, PERTURBATION, Perturbation, linear_parts, small_until, whole
+from .small_motion import DIED, LINEAR, PERTURBATION, SLIPS, Perturbation, linear_parts, small_until, whole
 from .told import ABOVE, certain, told
 
 TOLD_APART = 40  # modes, each of two poles, that `components` tells apart in one signal
@@ -46,7 +46,6 @@ MOST_WORK = 2e9  # steps times freedoms: what a march may take to become longer
 WATCHED = 100  # nodes of the bodies whose motion gives shapes
 MOST_BYTES = 128e6  # of their motion
 MOST_INSTANTS = 4096  # of it in a shape
-SLIPS = 1e-6  # of how fast a mode moves: where contacts slip less, it would need a huge amplitude to show there
 SILENT = "the contacts show nothing of a small motion in time"
 
 

@@ -15,7 +15,7 @@ from ..notebook import Shown, html_table
 from ..tabular import Cell, Rows, Tabular, dataset, split
 from ..temporal.growth import Growth
 from .settled import SettledVelocity
-from .small_motion import LEVEL, Perturbation
+from .small_motion import LEVEL, SLIPS, Perturbation
 
 if TYPE_CHECKING:
     from .four_answers import FourAnswers
@@ -250,9 +250,10 @@ def judge(
     if rival is not None:
         sentence = f"{sentence}; by the modes {_vibration(rival)} grows as fast, within {100 * GOOD_GROWTH:g} %"
     if hidden is not None:
+        grows = f"{_vibration(hidden)} grows, in which contacts slip by less than {SLIPS:g} of what moves"
         agrees, sentence = None if agrees else agrees, (
-            f"μ = {mu:g}: by the modes {_vibration(hidden)} grows, in which no contact slips, so that a motion in time "
-            f"does not show it; of what it shows: {sentence.removeprefix(f'μ = {mu:g}: ')}"
+            f"μ = {mu:g}: by the modes {grows}, so that a motion in time does not show it; of what it shows: "
+            f"{sentence.removeprefix(f'μ = {mu:g}: ')}"
         )
     if not refuted(completeness):
         return agrees, sentence

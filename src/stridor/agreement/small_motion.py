@@ -17,6 +17,7 @@ LINEAR = 0.02  # of the slip speed: beyond it the perturbation is no longer smal
 # motion, which has any rate.
 DIED = 1e-5
 LIVES = 0.9  # of the time of the signal that is heard longest: what dies before has nothing that lasts
+SLIPS = 1e-6  # of how fast a mode moves: where contacts slip less, it would need a huge amplitude to show there
 LEVEL = 1e-6  # of |λ|: growth or decay in time below it is none, of motion that nothing damps
 
 
