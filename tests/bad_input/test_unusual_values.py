@@ -414,6 +414,17 @@ def test_verbs_say_which_option_asks_for_it(
     assert "a friction coefficient is at most 1e+06" in err
 
 
+@pytest.mark.parametrize("option", ["--mu", "--range"])
+@pytest.mark.parametrize("value", ["0.5:0.1", "a:b"])
+def test_a_range_of_cycles_is_refused_by_the_option_it_was_given_with(
+    option: str, value: str, tmp_path: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "case.toml").write_text(SHORT.text)
+    code, _, err = program(["cycles", str(tmp_path / "case.toml"), option, value], capsys)
+    assert code == 2
+    assert f"stridor: {option}: '{value}' – " in err
+
+
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("stiffness", [1e-150, 1e-300, 1e-320])
 def test_a_contact_as_good_as_without_stiffness(stiffness: float) -> None:

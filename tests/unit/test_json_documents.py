@@ -12,6 +12,8 @@ from documented import assert_told, told_names
 from program import stridor
 from stridor.app.option_table import EVERY
 from stridor.case import template_text
+from stridor.temporal.attractor import NAMES as AVERAGES
+from stridor.temporal.energy import SKEW
 from undrawn import nothing_drawn
 
 FEW = [
@@ -69,6 +71,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_every_verb_is_told_of() -> None:
     assert set(told_names()[1]) == {name.split()[0] for name in WORDS} | OF_TABLES == set(EVERY)
+
+
+def test_names_that_only_some_runs_have_are_told_of() -> None:
+    """Averages are of contacts that have separated, works of skew parts of matrices that are not symmetric: the case of
+    the test below has neither."""
+    assert {*AVERAGES, *SKEW} <= told_names()[1]["simulate"]
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] if n == "compare" else []) for n in WORDS])

@@ -9,8 +9,13 @@ import pytest
 
 import stridor as st
 from mode_coupling import mode_coupling
+from stridor.agreement import Perturbation
+from stridor.agreement.partner import Partner, partner_of
+from stridor.agreement.result import judge
 from stridor.agreement.shapes import TimeShape, span_assurance
 from stridor.case import Case
+from stridor.temporal.signals import Components
+from stridor.view.temporal_tables import agreement_table
 
 pytestmark = pytest.mark.verification
 
@@ -115,3 +120,118 @@ def test_a_system_of_matrices_is_compared_by_growth() -> None:
     )
     work = st.Workspace(system, modal={"max_frequency_hz": 2.0}, temporal={"step": 1e-3})
     assert [one.agrees for one in st.compare(work, [0.7], only=["growth"]).comparisons] == [True]
+
+
+def test_a_run_without_bodies_is_told_by_frequency_alone() -> None:
+    """No shape that could be compared is not a frequency that no mode has."""
+    contact = {
+        "normal": [0, 1], "tangent": [1, 0], "stiffness": 0.4, "slip": 1.0, "friction": {"law": "coulomb", "coefficient": 1.9}
+    }  # fmt: skip
+    system = st.System.from_matrices(
+        np.eye(2), 0.01 * np.eye(2), [[2.0, 0.3], [0.3, 2.2]], contacts={"a": contact}, loads={"F": [0, -1]},
+        points={"p": np.eye(2)},
+    )  # fmt: skip
+    work = st.Workspace(
+        system, modal={"max_frequency_hz": 2.0}, phases=[{"name": "a", "duration": 100.0}],
+        temporal={"watch": ["p"], "step": 0.02},
+    )  # fmt: skip
+    (one,) = st.compare(work, 1.9, critical=False).comparisons
+    assert (one.mac, one.responding) == (None, 0)
+    assert "none of the unstable modes" not in one.verdict
+    assert one.verdict.endswith(
+        "answers at 0.2441 Hz, within 5 % of the unstable mode at 0.2416 Hz, with whose shape it is not compared"
+    )
+
+
+def three(damping: list[float], coupling: tuple[float, float] = (0.1, 0.2), mu: float = 0.2) -> st.Agreement:
+    """Three freedoms, of which a contact slips along the first and presses on the second: growth alone."""
+    contact = {
+        "normal": [0, 1, 0], "tangent": [1, 0, 0], "stiffness": 5.0, "slip": 1.0,
+        "friction": {"law": "coulomb", "coefficient": mu},
+    }  # fmt: skip
+    one, two = coupling
+    system = st.System.from_matrices(
+        np.eye(3), np.diag(damping), [[2.0, 0.3, one], [0.3, 3.0, two], [one, two, 4.5]], contacts={"c": contact},
+        loads={"F": [0, -1, 0]},
+    )  # fmt: skip
+    work = st.Workspace(system, modal={"max_frequency_hz": 2.0}, temporal={"stepper": "exact", "step": 0.05})
+    return st.compare(work, mu, only=["growth"])
+
+
+@pytest.mark.parametrize("damping", [-2e-6, pytest.param(-2e-3, marks=pytest.mark.slow)])
+def test_of_modes_that_grow_alike_time_may_show_any_first(damping: float) -> None:
+    """C = c M moves every root alike: all grow at −c/2, at three frequencies."""
+    (one,) = three([damping] * 3).comparisons
+    assert one.agrees is True, one.verdict
+    assert one.frequency_error < 1e-6
+    assert one.modal_eigenvalue.imag == pytest.approx(one.perturbation.eigenvalue.imag, rel=1e-6)
+    assert one.perturbation.growth_rate == pytest.approx(-damping / 2, rel=1e-6)
+    assert f"both unstable at {one.modal_eigenvalue.imag / (2 * np.pi):.5f} Hz" in one.verdict
+    assert agreement_table(one).rows[0].cells[1:3] == ("unstable", "unstable")
+
+
+def in_time(*components: complex, unshown: tuple[complex, ...] = ()) -> Perturbation:
+    lam = np.array(components)
+    fastest = complex(lam[np.argmax(lam.real)])
+    return Perturbation(
+        0.1, fastest, np.zeros(0), 1.0, Components(lam, np.ones(len(lam))), unshown=np.array(unshown, dtype=complex)
+    )  # fmt: skip
+
+
+def test_what_grows_as_fast_stands_for_the_fastest_where_that_is_in_the_motion_too() -> None:
+    modes, both = np.array([1e-2 + 2j, 0.98e-2 + 3j, -1e-3 + 1j]), np.array([0, 1])
+    assert partner_of(modes, both, in_time(0.999e-2 + 2j, 1e-2 + 3j)) == Partner(1, unstable=True, rival=1e-2 + 2j)
+    assert partner_of(modes, both, in_time(1.01e-2 + 2j, 1e-2 + 3j)) == Partner(0, unstable=True)
+    # A mode that is not in the motion is not borne out, and one that is no mode's is none of them.
+    assert partner_of(modes, both, in_time(1e-2 + 3j, -1e-3 + 1j)) == Partner(0, unstable=True)
+    assert partner_of(modes, both, in_time(1e-2 + 2j, 1.02e-2 + 2.5j)) == Partner(0, unstable=True)
+    # Nor does one that grows more slowly stand for it, or both together: 10 % in all.
+    slower = np.array([1e-2 + 2j, 0.94e-2 + 3j])
+    assert partner_of(slower, both, in_time(0.93e-2 + 2j, 0.94e-2 + 3j)) == Partner(0, unstable=True)
+    apart = np.array([1e-2 + 2j, 0.96e-2 + 3j])
+    assert partner_of(apart, both, in_time(0.9e-2 + 2j, 0.93e-2 + 3j)) == Partner(0, unstable=True)
+
+
+def test_growth_in_which_no_contact_slips_is_not_decided() -> None:
+    """An oscillator beside the contact, damped by −0.03: λ = 0.015 ± 2.1213j."""
+    (one,) = three([0.02, 0.02, -0.03], coupling=(0.0, 0.0)).comparisons
+    assert one.agrees is None
+    assert one.unstable_growth == pytest.approx((0.015,))
+    assert one.perturbation.unshown == pytest.approx([0.015 + 1j * np.sqrt(4.5 - 0.015**2)])
+    assert "Hz with 0.01500 1/s grows, in which contacts slip by less than 1e-06 of what moves" in one.verdict
+    assert "of what it shows: both stable (slowest decay" in one.verdict
+    # With a spring to it the contact slips, and time shows it.
+    (shown,) = three([0.02, 0.02, -0.03], coupling=(1e-3, 0.0)).comparisons
+    assert shown.agrees is True, shown.verdict
+    assert not len(shown.perturbation.unshown)
+
+
+def test_what_contacts_show_still_disagrees_where_they_do_not_show_all() -> None:
+    hidden, seen, stable = 2e-2 + 4j, 1e-2 + 2j, -1e-2 + 3j
+
+    def said(modes: list[complex], found: Perturbation) -> bool | None:
+        lam = np.array(modes)
+        grow = np.flatnonzero(lam.real > 0)
+        partner = partner_of(lam, grow, found)
+        here, at = lam[partner.column], found.eigenvalue
+        errors = abs(at.imag / here.imag - 1.0), abs(at.real / here.real - 1.0)
+        return judge(0.1, partner.unstable, here, found, *errors, hidden=partner.hidden)[0]
+
+    assert said([hidden, stable], in_time(stable, unshown=(hidden,))) is None
+    assert said([hidden, seen, stable], in_time(seen, stable, unshown=(hidden,))) is None
+    # Another motion grows, or decays, than the mode that slips; and one that slips must be there.
+    assert said([hidden, stable], in_time(1e-2 + 3j, unshown=(hidden,))) is False
+    assert said([hidden, seen, stable], in_time(stable, unshown=(hidden,))) is False
+    assert said([hidden, stable], in_time(stable)) is False
+    # What has grown out of rounding is seen.
+    assert said([hidden, stable], in_time(hidden, stable, unshown=(hidden,))) is True
+    assert said([seen, 0.5e-2 + 4j, stable], in_time(seen, stable, unshown=(0.5e-2 + 4j,))) is True
+
+
+def test_growth_that_is_less_than_what_time_tells_is_not_decided() -> None:
+    """Of |λ| modes tell 1e-9, a signal 1e-6."""
+    agrees, sentence = judge(0.1, True, 3e-9 + 1j, in_time(-2e-8 + 1j), 0.0, 7.0)
+    assert agrees is None
+    assert "more slowly than a motion in time tells" in sentence
+    assert judge(0.1, True, 3e-9 + 1j, in_time(-1e-3 + 1j), 0.0, 1e5)[0] is False
+    assert judge(0.1, True, 1e-6 + 1j, in_time(1.0001e-6 + 1j), 0.0, 1e-4)[0] is True

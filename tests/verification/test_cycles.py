@@ -610,3 +610,18 @@ def test_what_was_not_followed_to_its_end_is_not_said_to_end(monkeypatch: pytest
     with pytest.raises(NoReturn, match=r"^no contact changes within .* s, and whether any does later was not followed") as told:
         cycles_reached(problem, pushed(problem, 1e-9))
     assert not told.value.steady
+
+
+@pytest.mark.parametrize("push", [1e300, -1e101, [0.1, float("inf")]])
+def test_pushes_beyond_the_range_of_numbers_are_refused(push: Any):
+    with pytest.raises(st.CaseError, match=r"push: .* up to 1e\+100"):
+        st.cycles(mode_coupling(DAMPED, 0.1), 1.0, push=push)
+
+
+def test_a_motion_beyond_the_range_of_numbers_is_no_return():
+    problem = Family(st.Workspace(mode_coupling(DAMPED, 0.1)).system()).at(1.0)
+    with np.errstate(over="ignore"), pytest.raises(NoReturn, match="the motion leaves the range of numbers"):
+        cycles_reached(problem, pushed(problem, 1e200))
+    met = [returns._Met(("change", 0, (0,)), float(k), np.full(2, np.inf)) for k in range(6)]
+    with np.errstate(invalid="ignore"):
+        assert returns._return(met, [1.0] * 6) == (0, np.inf)

@@ -69,6 +69,8 @@ def test_ctrl_c_ends_the_run_and_keeps_what_was_found():
     found = st.cycles(work, mu, progress=stop)
     assert found.interrupted
     assert not found.cycles
+    assert found.sentence.startswith("the search was stopped before any limit cycle was found")
+    assert found.warnings[0] == found.sentence
 
 
 def test_a_return_is_that_of_all_contacts():

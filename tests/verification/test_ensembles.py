@@ -8,6 +8,7 @@ runs are compared step by step, and by what holds whatever the rounding.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -292,6 +293,13 @@ def test_a_member_that_cannot_begin_says_why(monkeypatch):
     assert found.regime[1] == "failed"
     assert np.isfinite(found.rms[0])
     assert np.isnan(found.rms[1])
+
+
+@pytest.mark.parametrize("settings", [{"stepper": "exact"}, {"stepper": "implicit", "max_frequency_hz": 2e4}, {"path": "nodal"}])
+def test_what_the_case_asks_for_is_named_as_the_reason_for_separate_runs(settings: dict[str, Any]):
+    system = coarse()
+    key, value = next(iter(settings.items()))
+    assert ensembles._shared(system, Settings(**settings), PHASES) == (None, f'temporal.{key} is "{value}"')
 
 
 def test_contacts_that_slide_far_take_separate_runs_and_a_note_says_so():

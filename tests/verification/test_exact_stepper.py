@@ -668,3 +668,14 @@ def test_what_it_does_not_take_is_said(contact: dict[str, Any], said: str):
     with pytest.raises(st.CaseError, match=said) as refused:
         exact(system, 1.0, step=1e-2)
     assert 'take "explicit"' in str(refused.value)
+
+
+@pytest.mark.filterwarnings("error")
+def test_records_further_apart_than_growth_has_numbers_for() -> None:
+    """Between two of them a mode would grow by e^1000; the phase ends before the first."""
+    changes = {
+        "temporal.stepper": "exact", "temporal.step": 0.01, "temporal.record_every": 1_000_000,
+        "contacts.rub.friction.coefficient": 1.4, "phases": [{"name": "a", "duration": 1.0}],
+    }  # fmt: skip
+    run = st.simulate(mode_coupling(0.02).with_(changes))
+    assert (run.steps, len(run.time)) == (100, 1)

@@ -33,8 +33,9 @@ from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .critical import compare_critical
 from .kept import PartStore, Plain, float_of, growth_data, growth_of, pair_of, perturbation_data, perturbation_of
 from .pairs import TOGETHER
+from .partner import Partner, partner_of
 from .perturbation import modes_as_in_time, perturb, perturbation_step
-from .result import Agreement, Comparison, Critical, decays_as_none, judge, likeness, overall
+from .result import NEAR, Agreement, Comparison, Critical, decays_as_none, judge, likeness, overall
 from .settled import SettledVelocity, last_rate, settled_of, settled_velocity
 from .shapes import by_body, mode_shape, span_assurance
 from .small_motion import Perturbation, whole
@@ -43,7 +44,6 @@ T = TypeVar("T")
 PARTS = ("growth", "run", "critical")
 LEAST_PERIODS = 4.0  # of the dominant line, over which growth is fitted
 HALVED = 0.5  # of a difference: what half the step may leave of it where it comes of the step
-NEAR = 0.05  # of the frequency: within it an unstable mode responds
 
 
 def _silent(text: str) -> None:
@@ -233,7 +233,10 @@ class _At:
                     return replace(found, verdict=f"{found.verdict}; no full run: {error}")
             answered = self._answer(mu, run, self._modes(mu) if modes is None else modes)
             self._keep("run", mu, _run_data(answered))
-        verdict = likeness(found.verdict, answered.dominant, answered.mac, unstable=bool(found.unstable_hz))
+        near = None if answered.responding is None else found.unstable_hz[answered.responding]
+        verdict = likeness(
+            found.verdict, answered.dominant, answered.mac, unstable=bool(found.unstable_hz), mode_hz=near
+        )
         if self.unlike:
             verdict = f"{found.verdict}; the full run is held against no mode: {self.unlike}"
         return replace(
@@ -265,9 +268,11 @@ class _At:
         lam = modes.eigenvalues[0]
         if not len(lam):
             raise AnalysisError(f"no mode below {self.limit:g} Hz, so there is nothing to compare")
-        first = unstable if not diverges else unstable[lam[unstable].imag == 0.0]
-        partner = int(first[0]) if len(first) else int(np.argmin(np.abs(lam - perturbation.eigenvalue)))
-        here = complex(lam[partner])
+        if diverges:
+            partner = Partner(int(unstable[lam[unstable].imag == 0.0][0]), unstable=True)
+        else:
+            partner = partner_of(lam, unstable, perturbation)
+        here = complex(lam[partner.column])
         frequency = abs(perturbation.eigenvalue.imag - here.imag) / max(abs(here.imag), 1e-300)
         rate = abs(perturbation.eigenvalue.real - here.real) / max(abs(here.real), 1e-300)
         told = modes.completeness[0]
@@ -276,11 +281,11 @@ class _At:
         shape = None if perturbation.shape is None else perturbation.shape.likeness(modes.right[0, alike])
         bodies = bool(self.about.lines or self.about.solids)
         agrees, verdict = judge(
-            mu, len(unstable) > 0, here, perturbation, frequency, rate, told, shape, shape_asked=bodies,
-            last=_last(modes, self.limit),
+            mu, partner.unstable, here, perturbation, frequency, rate, told, shape, shape_asked=bodies,
+            last=None if len(unstable) else _last(modes, self.limit), rival=partner.rival, hidden=partner.hidden,
         )  # fmt: skip
         # Beside a double root a step moves the roots of what it marches by the root of its error.
-        foreign = agrees is None and decays_as_none(perturbation, frequency, rate) and not len(unstable)
+        foreign = agrees is None and decays_as_none(perturbation, frequency, rate) and not partner.unstable
         if (agrees is False or foreign) and not diverges:
             verdict, agrees = self._resolved(mu, here, perturbation, verdict, own, agrees)
         return Comparison(

@@ -31,7 +31,7 @@ from ..threads import one_thread
 from ..typing import Array, ComplexArray, IntArray, Sparse
 from .pairs import second_of, silent_pairs, slip_of
 from .shapes import component_shape, node_rows
-from .small_motion import DIED, LINEAR, PERTURBATION, Perturbation, linear_parts, small_until, whole
+from .small_motion import DIED, LINEAR, PERTURBATION, SLIPS, Perturbation, linear_parts, small_until, whole
 from .told import ABOVE, certain, told
 
 TOLD_APART = 40  # modes, each of two poles, that `components` tells apart in one signal
@@ -108,6 +108,7 @@ def perturb(
         for one, _ in pairs
     }
     start, moved = _in_equal_measure(nodes, lam[single], vectors[single], seconds)
+    unshown = _unshown(nodes, lam[single], vectors[single], seconds)
     start *= PERTURBATION * speed[speed > 0.0].min() / len(chosen)
     step = perturbation_step(system, settings)
     top = _top(found, max_frequency_hz)
@@ -149,7 +150,7 @@ def perturb(
     why = "" if sure else _too_short(len(signal) * run.sampling, lam, left=left)
     if not (len(signal) or left):
         why = SILENT
-    return Perturbation(mu, band.fastest, signal, run.sampling, band, form, why, left, grown)
+    return Perturbation(mu, band.fastest, signal, run.sampling, band, form, why, left, grown, unshown)
 
 
 def _within(signals: Array, sampling: float, max_frequency_hz: float) -> float:
@@ -207,12 +208,11 @@ def _in_equal_measure(
     total, moved = np.zeros((3, vectors.shape[1])), np.zeros(nodes.count)
     for number, (value, vector) in enumerate(zip(lam, vectors, strict=True)):
         second = None if seconds is None else seconds.get(number)
-        speed = value * vector if second is None else value * second + vector
+        speed = _speed(value, vector, second)
+        if not _slips(nodes, speed):
+            continue
         motion = slip_of(nodes, speed)
         peak = float(motion.max())
-        # Modes that do not slip would need a huge amplitude to show in the slip speed; leave them out.
-        if peak < 1e-6 * float(np.abs(speed).max()):
-            continue
         # Phases spread by the golden angle, so that nothing adds up at the start.
         turned = np.exp(2.399963j * number) / peak
         scaled = vector * turned
@@ -223,6 +223,24 @@ def _in_equal_measure(
             total += np.real([other, value * other + scaled, value**2 * other + 2 * value * scaled])
         moved += motion / peak
     return total, moved
+
+
+def _speed(value: complex, vector: ComplexArray, second: ComplexArray | None) -> ComplexArray:
+    """Velocity (n,) of a mode v e^{λt}, of (w + t v) e^{λt} where w is given, at the start."""
+    return value * vector if second is None else value * second + vector
+
+
+def _slips(nodes: ContactNodes, speed: ComplexArray) -> bool:
+    """Whether a mode of this velocity (n,) shows in the slip speed of any contact."""
+    return bool(slip_of(nodes, speed).max() >= SLIPS * float(np.abs(speed).max()))
+
+
+def _unshown(
+    nodes: ContactNodes, lam: ComplexArray, vectors: ComplexArray, seconds: Mapping[int, ComplexArray]
+) -> ComplexArray:
+    """λ of the modes that `_in_equal_measure` leaves out."""
+    speeds = (_speed(complex(lam[k]), vector, seconds.get(k)) for k, vector in enumerate(vectors))
+    return lam[[not _slips(nodes, speed) for speed in speeds]]
 
 
 def _leaders(nodes: ContactNodes, speed: Array, moved: Array) -> IntArray:

@@ -15,7 +15,7 @@ from ..notebook import Shown, html_table
 from ..tabular import Cell, Rows, Tabular, dataset, split
 from ..temporal.growth import Growth
 from .settled import SettledVelocity
-from .small_motion import LEVEL, Perturbation
+from .small_motion import LEVEL, SLIPS, Perturbation
 
 if TYPE_CHECKING:
     from .four_answers import FourAnswers
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 SAME_DECAY = 0.25
 TURNS = 3.0  # periods of a mode that a signal must hold to tell its rate
 GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, GOOD_CRITICAL = 0.01, 0.05, 0.8, 0.03
+NEAR = 0.05  # of the frequency of a full run: an unstable mode within it responds
 AGREE, DISAGREE, UNDECIDED = "agree: ", "disagree: ", "not decided: "
 
 
@@ -31,11 +32,12 @@ AGREE, DISAGREE, UNDECIDED = "agree: ", "disagree: ", "not decided: "
 class Comparison(Shown):
     """Both approaches at one μ.
 
-    modal_eigenvalue: the mode that belongs to what the temporal side shows growing fastest (or decaying
-    slowest); frequency_error, growth_rate_error relative; mac between the operating shape of the full run
-    at its dominant frequency and the mode that responds (None if none does); unstable_hz: all unstable modes in range;
-    responding: position in that list of the mode that the full run answers with, None if none. growth_mac: between the
-    shape of the fastest component of the small perturbation and that mode, None where it was not taken.
+    modal_eigenvalue: the mode that belongs to what the temporal side shows growing fastest (or decaying slowest): the
+    fastest, or of those that grow as fast the one that time shows; frequency_error, growth_rate_error relative; mac
+    between the operating shape of the full run at its dominant frequency and the mode that responds (None if none does,
+    and where there are no bodies whose shapes could be compared); unstable_hz: all unstable modes in range; responding:
+    position in that list of the mode that the full run answers with, None if none. growth_mac: between the shape of the
+    fastest component of the small perturbation and that mode, None where it was not taken.
     agrees: None where the signal in time tells nothing to hold the modes against, and where the modes are not borne out
     by the search of the full problem; completeness says what that came to. settled: what the full run has come to, None
     where it has not or where there is none, and unsettled says why.
@@ -226,11 +228,14 @@ def judge(
     *,
     shape_asked: bool = False,
     last: complex | None = None,
+    rival: complex | None = None,
+    hidden: complex | None = None,
 ) -> tuple[bool | None, str]:
     """Whether both approaches agree at one μ, None where the signal shows nothing or tells no components apart, where
     what grows has another shape (MAC, None where it was not taken or, if asked for, not told) and where the modes are
     not borne out (``completeness``), and the sentence that says it. last: the mode that dies out last, which contacts
-    may not show."""
+    may not show. rival: one that grows as fast as ``here``. hidden: one that grows, faster than all that contacts show,
+    which ``unstable`` is about: then nothing agrees."""
     agrees, sentence = _judged(mu, unstable, here, perturbation, frequency, rate)
     if agrees is False and perturbation.untold:
         said = "unstable" if unstable else "stable"
@@ -242,6 +247,14 @@ def judge(
     slower = last is not None and last.real - here.real > max(SAME_DECAY * abs(here.real), LEVEL * abs(last))
     if agrees and not unstable and last is not None and slower:
         sentence = f"{sentence}; by the modes {_vibration(last)} dies out last, which the contacts do not show"
+    if rival is not None:
+        sentence = f"{sentence}; by the modes {_vibration(rival)} grows as fast, within {100 * GOOD_GROWTH:g} %"
+    if hidden is not None:
+        grows = f"{_vibration(hidden)} grows, in which contacts slip by less than {SLIPS:g} of what moves"
+        agrees, sentence = None if agrees else agrees, (
+            f"μ = {mu:g}: by the modes {grows}, so that a motion in time does not show it; of what it shows: "
+            f"{sentence.removeprefix(f'μ = {mu:g}: ')}"
+        )
     if not refuted(completeness):
         return agrees, sentence
     return (None if agrees else agrees), f"{sentence}; but which modes there are is not certain"
@@ -271,6 +284,11 @@ def _judged(
     still = max(abs(seen.real), abs(here.real)) <= 2 * LEVEL * abs(here)
     # What is not a number is not good.
     good = frequency <= GOOD_FREQUENCY and (rate <= GOOD_GROWTH or still)
+    if unstable and quiet(seen, here) and not (frequency <= GOOD_FREQUENCY and rate <= GOOD_GROWTH):
+        return None, (
+            f"μ = {mu:g}: by the modes {_vibration(here)} grows, more slowly than a motion in time tells, which shows "
+            f"{_vibration(seen)}"
+        )
     if unstable != perturbation.grows and not (good and still):
         other = "grows" if perturbation.grows else "does not grow"
         return False, f"μ = {mu:g}: they disagree; modal says {said}, the temporal perturbation {other}"
@@ -297,6 +315,11 @@ def _judged(
     )
 
 
+def quiet(seen: complex, here: complex) -> bool:
+    """Whether neither what is seen in time nor a mode grows or decays by more than what a signal tells."""
+    return all(abs(lam.real) <= 2 * LEVEL * abs(lam) for lam in (seen, here))
+
+
 def decays_as_none(perturbation: Perturbation, frequency: float, rate: float) -> bool:
     """Whether what is told in time decays otherwise than the nearest mode: frequency and rate are off by as much."""
     told = perturbation.shows and not perturbation.untold and not perturbation.grows
@@ -308,9 +331,16 @@ def _vibration(lam: complex) -> str:
     return f"{readable(lam.imag / (2 * np.pi), 5)} Hz with {readable(lam.real, 4)} 1/s"
 
 
-def likeness(verdict: str, dominant: float | None, mac: float | None, *, unstable: bool) -> str:
-    """The verdict of one μ with what the full run answers, in the shape of an unstable mode, or at the frequency of
-    none of those there are."""
+def likeness(
+    verdict: str, dominant: float | None, mac: float | None, *, unstable: bool, mode_hz: float | None = None
+) -> str:
+    """The verdict of one μ with what the full run answers, in the shape of an unstable mode, at the frequency mode_hz
+    of one where there is no shape to compare (None: of none), or at the frequency of none of those there are."""
+    if dominant is not None and mac is None and mode_hz is not None:
+        return (
+            f"{verdict}; the full run answers at {readable(dominant, 4)} Hz, within {100 * NEAR:g} % of the unstable "
+            f"mode at {readable(mode_hz, 4)} Hz, with whose shape it is not compared"
+        )
     if dominant is not None and mac is None and unstable:
         return f"{verdict}; the full run answers at {readable(dominant, 4)} Hz, which none of the unstable modes has"
     if dominant is None or mac is None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..temporal.signals import SHARE, Components
 from ..temporal.trajectory import Trajectory
-from ..typing import Array
+from ..typing import Array, ComplexArray
 from .shapes import TimeShape
 
 PERTURBATION = 1e-5  # of the slip speed, at the start
@@ -17,6 +17,7 @@ LINEAR = 0.02  # of the slip speed: beyond it the perturbation is no longer smal
 # motion, which has any rate.
 DIED = 1e-5
 LIVES = 0.9  # of the time of the signal that is heard longest: what dies before has nothing that lasts
+SLIPS = 1e-6  # of how fast a mode moves: where contacts slip less, it would need a huge amplitude to show there
 LEVEL = 1e-6  # of |λ|: growth or decay in time below it is none, of motion that nothing damps
 
 
@@ -26,7 +27,8 @@ class Perturbation:
     the signal (slip speed minus its steady value) [m/s] where it is linear, its sampling [s], and every
     component found in it. shape: how nodes move in the fastest, None where it was not asked for or cannot be told.
     untold: why the signal does not tell the fastest apart from the others, "" where it does. left: whether it grew out
-    of the linear range, grown: within the frequency range, by whichever component."""
+    of the linear range, grown: within the frequency range, by whichever component. unshown: λ (j,) of modes in which no
+    contact slips, so that the motion was begun without them."""
 
     mu: float
     eigenvalue: complex
@@ -37,6 +39,7 @@ class Perturbation:
     untold: str = ""
     left: bool = False
     grown: bool = False
+    unshown: ComplexArray = field(default_factory=lambda: np.zeros(0, dtype=complex))
 
     @property
     def growth_rate(self) -> float:

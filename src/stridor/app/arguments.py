@@ -87,10 +87,12 @@ class Call:
         *,
         undamped: bool = False,
         stepper: str | None = None,
+        range_option: str = "--range",
     ) -> Workspace:
         """The case in the file with overrides, its warnings printed and its folder claimed; settings without effect are
         told with the results. source, max_frequency [Hz], friction_range ("low:high"), undamped: options that stand for
-        a setting of [modal], which the case then has; stepper: for one of [temporal]. Raises CaseError.
+        a setting of [modal], which the case then has; stepper: for one of [temporal]; range_option: what the range was
+        given with. Raises CaseError.
 
         A verb asks for it before it imports what it computes with: what is wrong with the file is said at once."""
         from ..case import load
@@ -106,7 +108,7 @@ class Call:
                 raise CaseError("--max-frequency", max_frequency, "a highest frequency is a finite number > 0 [Hz]")
             own.append(f"modal.max_frequency_hz={max_frequency!r}")
         if friction_range is not None:
-            own.append(f"modal.friction_range={list(self.range_of_friction(friction_range))}")
+            own.append(f"modal.friction_range={list(self.range_of_friction(friction_range, range_option))}")
         if undamped:
             own.append("modal.damped=false")
         if stepper is not None:

@@ -69,13 +69,14 @@ def cycles(
     source: Source = None,
 ) -> None:
     """Limit cycles: what it swings in beyond the onset, how loud, from where to where. Ctrl-C keeps what was found."""
+    option = "--range"
     if mu is not None and mu.count(":") == 1:
         if friction_range is not None:
             raise CaseError("--mu", mu, "friction coefficients, or the range without --range")
-        mu, friction_range = None, mu
+        mu, friction_range, option = None, mu, "--mu"
     values = None if mu is None else numbers(mu, "--mu")
     pushes = None if push is None else numbers(push, "--push", least=-float("inf"))
-    work = call.workspace(source, max_frequency, friction_range)
+    work = call.workspace(source, max_frequency, friction_range, range_option=option)
     call.check_friction(values)
 
     from ..study.cycles import cycles as solve

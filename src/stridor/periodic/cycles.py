@@ -78,6 +78,8 @@ class Cycles(Tabular):
         """What was found, in one sentence."""
         if not self.cycles:
             rest = "; what was looked for and not reached is named below" if self.missing else ""
+            if self.interrupted:
+                return f"the search was stopped before any limit cycle was found{rest}"
             return f"no limit cycle was found{rest}"
         mus = [c.mu for c in self.cycles]
         over = f"μ = {mus[0]:.6g}" if min(mus) == max(mus) else f"μ = {min(mus):.6g} to {max(mus):.6g}"
@@ -103,7 +105,7 @@ class Cycles(Tabular):
     def warnings(self) -> tuple[str, ...]:
         """What a reader must know of them."""
         rested = sum(c.landed > 0 for c in self.cycles)
-        said = [f"stopped early: {self.sentence}"] if self.interrupted else []
+        said = [f"stopped early: {self.sentence}" if self.cycles else self.sentence] if self.interrupted else []
         if rested:
             said.append(
                 f"in {counted(rested, 'cycle')} contacts throw one another off without end and were brought to rest, "

@@ -132,6 +132,8 @@ def cycles_reached(
             words, steady = outcome(problem, motion, away, since)
             raise NoReturn(words, steady=steady)
         passed.append(_Met((*change, motion.status), motion.time, np.concatenate([scale * motion.q, motion.v])))
+        if not np.isfinite(passed[-1].state @ passed[-1].state):
+            raise NoReturn("the motion leaves the range of numbers")
         away = distance(problem, motion.q, motion.v)
         lag, off = _return(passed, went)
         nearest = min(nearest, off)
@@ -187,7 +189,10 @@ def _return(met: list[_Met], went: list[float]) -> tuple[int, float]:
     before = np.array([met[-1 - i].state for i in range(1, lags[-1] + 1)])
     away = np.linalg.norm(before - here.state, axis=1)
     extents = np.maximum.accumulate(np.maximum(away, went[: -lags[-1] - 1 : -1]))
-    found = [(lag, float(away[lag - 1]) / max(float(extents[lag - 1]), 1e-300)) for lag in lags]
+    shares = [(lag, float(away[lag - 1]) / max(float(extents[lag - 1]), 1e-300)) for lag in lags]
+    found = [(lag, off) for lag, off in shares if np.isfinite(off)]
+    if not found:
+        return 0, np.inf
     least = min(off for _, off in found)
     return next((lag, off) for lag, off in found if off <= max(3.0 * least, 1e-9))
 

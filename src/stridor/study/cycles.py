@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import interrupts
 from ..asking import FUNCTION, NUMBER, NUMBERS, PAIR, takes
+from ..case.fields import MOST
 from ..errors import AnalysisError, CaseError
 from ..periodic import Cycle, CycleBranch, CycleOnset, Cycles, Family, Unclosed, unfinished, why_not_shooting
 from ..periodic.harmonic import HarmonicFamily, why_not_harmonic
@@ -77,8 +78,8 @@ def cycles(
     work = Workspace.of(problem)
     values = [] if mu is None else [float(value) for value in np.ravel(np.asarray(mu, dtype=float))]
     pushes = None if push is None else [float(p) for p in np.ravel(np.asarray(push, dtype=float))]
-    if pushes is not None and not (pushes and np.all(np.isfinite(pushes)) and np.all(pushes)):
-        raise CaseError("push", push, "finite speeds above or below 0 [m/s]")
+    if pushes is not None and not (pushes and np.all(np.abs(pushes) <= MOST) and np.all(pushes)):
+        raise CaseError("push", push, f"finite speeds above or below 0 [m/s], up to {MOST:g}")
     if not (float(points).is_integer() and points >= 2):
         raise CaseError("points", points, "a whole number, at least 2 cycles of a branch")
     if seconds is not None and not seconds > 0.0:

@@ -21,7 +21,7 @@ from .inputs import check_inputs
 from .legs import Legs, in_two, leg_phases, legs_of
 from .march import Progress
 from .schedule import PhaseSpec
-from .settings import Settings
+from .settings import ASKED, Settings
 from .side_by_side import Block, Seen, Track
 from .simulate import plan, simulate, step_of
 from .steppers.modal import ModalStepper, choose_path, modal_stepper
@@ -73,7 +73,7 @@ def march_all(
     )  # fmt: skip
     parts = in_two(phases, window)
     gpu, said = place(device, len(tracks))
-    stepper, reason = (None, "asked for") if separately else _shared(taken, settings, parts)
+    stepper, reason = (None, ASKED) if separately else _shared(taken, settings, parts)
     if stepper is None and device == "gpu":
         raise CaseError("device", device, f"cpu: what is run separately ({reason}) runs on no GPU")
     step = stepper.scheme.step if stepper is not None else step_of(system, settings, parts)
@@ -121,6 +121,10 @@ def _shared(system: System, settings: Settings, phases: Sequence[PhaseSpec]) -> 
     """The stepper whose operators all members share, else None and why not."""
     path, why, _ = plan(system, settings, phases)
     if path != "modal":
+        if settings.stepper in ("exact", "implicit"):
+            why = f'temporal.stepper is "{settings.stepper}"'
+        elif why == ASKED:
+            why = f'temporal.path is "{settings.path}"'
         return None, why
     finite = [c.name for c in system.contacts if c.sliding != "small"]
     if finite:

@@ -15,6 +15,7 @@ from .highest import highest_hz
 # Explicit steps to a period: central differences shift a frequency by (2π/n)²/24 of it, damping on the older velocity
 # by δΔt/4, and what modes are shifted by against each other is to be small beside what makes them flutter.
 FEWEST, ENOUGH = 40, 80
+ASKED = "asked for"  # why a path is taken that the settings name
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from .march import Checkpoint, March, Progress
 from .observe import Observer
 from .restart import settings_of_restart
 from .schedule import PhaseSpec, lay_out
-from .settings import Settings, choose_step
+from .settings import ASKED, Settings, choose_step
 from .stepper import Disturbance, Stepper
 from .steppers.exact import exact_not_begun, exact_stepper, refuse, why_not_exact
 from .steppers.implicit import COARSEST, implicit_stepper, whole_steps, why_not_implicit
@@ -150,7 +150,7 @@ def _chosen(
     """Settings with the stepper that "auto" comes to, and why: of explicit steps only where phases, if there are any,
     keep it from others. A run that is gone on from keeps its own."""
     if settings.stepper != "auto":
-        return settings, "asked for" if settings.stepper in ("exact", "implicit") else ""
+        return settings, ASKED if settings.stepper in ("exact", "implicit") else ""
     if restart is not None:
         before = replace(settings, stepper=restart.path if restart.path in ("exact", "implicit") else "explicit")
         usual, why = _suiting(system, settings)
@@ -187,9 +187,9 @@ def stepper_for(system: System, settings: Settings, mu: float | None, why: str =
     """The method of time stepping that suits a system, or the one that the settings ask for; ``why`` it came to that
     (`_chosen`)."""
     if settings.stepper == "exact":
-        return exact_stepper(system, settings, mu, why or "asked for")
+        return exact_stepper(system, settings, mu, why or ASKED)
     if settings.stepper == "implicit":
-        return implicit_stepper(system, settings, mu, why or "asked for")
+        return implicit_stepper(system, settings, mu, why or ASKED)
     if sparse := _why_sparse(system, settings):
         return sparse_stepper(system, settings, mu, _joined(sparse, why))
     modes, reason = choose_path(system, settings)
@@ -202,4 +202,4 @@ def _why_sparse(system: System, settings: Settings) -> str:
     """Why a system is marched on assembled matrices, "" where the stepper on few point contacts takes it."""
     if why := refuses(system):
         return f"{why}: assembled matrices with lumped mass"
-    return "asked for" if settings.path == "assembled" else ""
+    return ASKED if settings.path == "assembled" else ""

@@ -152,8 +152,10 @@ def agreement_table(comparison: Comparison) -> Table:
     unstable = len(comparison.unstable_hz) > 0
     names = {True: "unstable", False: "stable"}
     undecided = comparison.agrees is None
-    same = unstable == temporal.grows and not undecided
-    seen = names[temporal.grows] if temporal.shows else "not seen"
+    # Growth that is less than what a signal tells by itself may still be told by the mode it is equal to.
+    grows = unstable if comparison.agrees else temporal.grows
+    same = unstable == grows and not undecided
+    seen = names[grows] if temporal.shows else "not seen"
     judged = "not decided" if undecided else _judged(same)
     rows = [TableRow(("steady sliding is", names[unstable], seen, "", judged), _kind(same))]
     rows += [] if not comparison.marched else [

@@ -32,7 +32,7 @@ from ...phase_results import fresh_statistics
 from ...restart import motion_ratio
 from ...saved import INFINITY, Bounds
 from ...schedule import PhaseSpec, Schedule
-from ...settings import Settings, choose_step, not_finite
+from ...settings import ASKED, Settings, choose_step, not_finite
 from ...sketch import sketch
 from ...stepper import Disturbance
 from ...trajectory import Trajectory
@@ -93,7 +93,7 @@ def exact_not_begun(system: System, settings: Settings, phases: Sequence[PhaseSp
     return not_begun(system, replace(settings, step=step), phases)
 
 
-def exact_stepper(system: System, settings: Settings, mu: float | None, why: str = "asked for") -> ExactStepper:
+def exact_stepper(system: System, settings: Settings, mu: float | None, why: str = ASKED) -> ExactStepper:
     """A system made ready, and why this way; mu scales every contact's friction law at its slip speed. Raises CaseError
     for a system that it does not take."""
     refuse(system, settings.cutoff_hz)

@@ -74,7 +74,8 @@ def leg_parts(
     rest_v = split.rest[:, y:] @ z.T
     rest = np.hstack([rest_q, rest_v, -(rest_q @ flow.lifted) - rest_v @ flow.lifted_rate])
     state = np.vstack([flow.modes_q, flow.modes_v])
-    turn: ComplexArray = np.exp(split.poles * between)
+    with np.errstate(over="ignore", invalid="ignore"):  # of records so far apart that a leg has none
+        turn: ComplexArray = np.exp(split.poles * between)
     found = {
         ENTER: np.vstack([enter.real, enter.imag]), REST: rest, SLOW: flow.slow,
         POLES: np.vstack([planes(split.poles), planes(1.0 / split.poles)]),

@@ -15,7 +15,7 @@ from ...node_history import NodeHistory
 from ...restart import motion_ratio
 from ...saved import INFINITY, STATUS_RANGE, Bounds
 from ...schedule import Schedule
-from ...settings import Settings, choose_step, not_finite
+from ...settings import ASKED, Settings, choose_step, not_finite
 from ...sketch import BODIES, differing, sketch
 from ...stepper import Disturbance
 from ...trajectory import Trajectory
@@ -54,7 +54,7 @@ def refuses(system: System) -> str:
 def choose_path(system: System, settings: Settings) -> tuple[UncoupledModes | None, str]:
     """Complete modal basis where it is exact, else None; and the reason in words."""
     if settings.path == "nodal":
-        return None, "asked for"
+        return None, ASKED
     modes = uncoupled_modes(system)
     if modes.proportional:
         return modes, "complete modal basis: damping is proportional in every component, the scheme is the same"
