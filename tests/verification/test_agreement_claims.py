@@ -122,8 +122,8 @@ def test_a_system_of_matrices_is_compared_by_growth() -> None:
     assert [one.agrees for one in st.compare(work, [0.7], only=["growth"]).comparisons] == [True]
 
 
-def test_a_run_without_bodies_is_told_by_frequency_alone() -> None:
-    """No shape that could be compared is not a frequency that no mode has."""
+def without_bodies() -> st.Workspace:
+    """Two freedoms that flutter, with a full run."""
     contact = {
         "normal": [0, 1], "tangent": [1, 0], "stiffness": 0.4, "slip": 1.0, "friction": {"law": "coulomb", "coefficient": 1.9}
     }  # fmt: skip
@@ -131,16 +131,37 @@ def test_a_run_without_bodies_is_told_by_frequency_alone() -> None:
         np.eye(2), 0.01 * np.eye(2), [[2.0, 0.3], [0.3, 2.2]], contacts={"a": contact}, loads={"F": [0, -1]},
         points={"p": np.eye(2)},
     )  # fmt: skip
-    work = st.Workspace(
+    return st.Workspace(
         system, modal={"max_frequency_hz": 2.0}, phases=[{"name": "a", "duration": 100.0}],
         temporal={"watch": ["p"], "step": 0.02},
     )  # fmt: skip
-    (one,) = st.compare(work, 1.9, critical=False).comparisons
+
+
+def test_a_run_without_bodies_is_told_by_frequency_alone() -> None:
+    """No shape that could be compared is not a frequency that no mode has."""
+    (one,) = st.compare(without_bodies(), 1.9, critical=False).comparisons
     assert (one.mac, one.responding) == (None, 0)
     assert "none of the unstable modes" not in one.verdict
     assert one.verdict.endswith(
         "answers at 0.2441 Hz, within 5 % of the unstable mode at 0.2416 Hz, with whose shape it is not compared"
     )
+
+
+def test_a_run_in_which_something_slower_is_stronger_answers_with_no_mode(monkeypatch) -> None:
+    """It is too short to tell with what, and what is kept of it for the next call knows so."""
+    from stridor.agreement import comparison
+
+    monkeypatch.setattr(comparison, "stronger_below", lambda run, limit: 0.1)
+    (one,) = st.compare(without_bodies(), 1.9, critical=False).comparisons
+    assert (one.mac, one.responding, one.stronger_below_hz) == (None, None, 0.1)
+    assert one.verdict.endswith(
+        "; the full run is too short to say what it answers with: what swings or drifts below 0.1000 Hz is stronger "
+        "than its line at 0.2441 Hz"
+    )
+    temporal = one.to_json()["temporal"]
+    assert (temporal["stronger_below_hz"], temporal["responding_mode_hz"]) == (0.1, None)
+    answer = comparison._Answer(0.2441, None, None, None, None, "why", 0.1)
+    assert comparison._run_of(1.9, comparison._run_data(answer)) == answer
 
 
 def three(damping: list[float], coupling: tuple[float, float] = (0.1, 0.2), mu: float = 0.2) -> st.Agreement:

@@ -235,8 +235,9 @@ class _At:
             self._keep("run", mu, _run_data(answered))
         near = None if answered.responding is None else found.unstable_hz[answered.responding]
         verdict = likeness(
-            found.verdict, answered.dominant, answered.mac, unstable=bool(found.unstable_hz), mode_hz=near
-        )
+            found.verdict, answered.dominant, answered.mac, unstable=bool(found.unstable_hz), mode_hz=near,
+            below_hz=answered.stronger_below,
+        )  # fmt: skip
         if self.unlike:
             verdict = f"{found.verdict}; the full run is held against no mode: {self.unlike}"
         return replace(
@@ -249,6 +250,7 @@ class _At:
             verdict=verdict,
             settled=answered.settled,
             unsettled=answered.unsettled,
+            stronger_below_hz=answered.stronger_below,
         )
 
     def _modes(self, mu: float) -> ComplexModes:
@@ -329,6 +331,9 @@ class _At:
         dominant, fitted = dominant_response(run, self.limit)
         found, why = settled_velocity(run, dominant, fitted, last_rate(modes))
         unstable = _unstable(modes, self.limit)
+        below = None if dominant is None else stronger_below(run, self.limit)
+        if below is not None:  # the line is not what it answers with
+            return _Answer(dominant, fitted, None, None, found, why, below)
         responding = _responding(modes, unstable, dominant) if dominant else None
         if dominant is None or responding is None or not (self.system.lines or self.system.solids):
             # Without a mode that responds, or without bodies, there is no shape to hold against another.
@@ -362,7 +367,7 @@ class _At:
 @dataclass(frozen=True)
 class _Answer:
     """What the full run answers with: dominant frequency [Hz], fit of its growth, the unstable mode, its likeness; what
-    it has settled to, else why not."""
+    it has settled to, else why not; below which frequency [Hz] something is stronger that it is too short to tell."""
 
     dominant: float | None
     fitted: Growth | None
@@ -370,6 +375,7 @@ class _Answer:
     mac: float | None
     settled: SettledVelocity | None
     unsettled: str
+    stronger_below: float | None = None
 
 
 def _alike(lam: ComplexArray, here: complex) -> BoolArray:
@@ -423,6 +429,7 @@ def _run_data(a: _Answer) -> Plain:
         "mac": a.mac,
         "settled": None if a.settled is None else a.settled.data,
         "unsettled": a.unsettled,
+        "stronger_below_hz": a.stronger_below,
     }
 
 
@@ -436,6 +443,7 @@ def _run_of(mu: float, data: Plain) -> _Answer:
         float_of(data, "mac"),
         settled_of(data["settled"]),
         str(data["unsettled"]),
+        float_of(data, "stronger_below_hz"),
     )
 
 

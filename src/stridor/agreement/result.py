@@ -40,7 +40,8 @@ class Comparison(Shown):
     fastest component of the small perturbation and that mode, None where it was not taken.
     agrees: None where the signal in time tells nothing to hold the modes against, and where the modes are not borne out
     by the search of the full problem; completeness says what that came to. settled: what the full run has come to, None
-    where it has not or where there is none, and unsettled says why.
+    where it has not or where there is none, and unsettled says why. stronger_below_hz: frequency [Hz] below which
+    something is stronger than the dominant line that the full run is too short to tell (no mode responds then).
     """
 
     mu: float
@@ -60,6 +61,7 @@ class Comparison(Shown):
     completeness: str = ""
     settled: SettledVelocity | None = None
     unsettled: str = ""
+    stronger_below_hz: float | None = None
 
     @property
     def _line(self) -> str:
@@ -86,6 +88,7 @@ class Comparison(Shown):
                 "frequency_hz": temporal.imag / (2 * np.pi) if marched else None,
                 "growth_rate": temporal.real if marched else None,
                 "dominant_frequency_hz": self.dominant_frequency_hz,
+                "stronger_below_hz": self.stronger_below_hz,
                 "saturated": None if self.run_growth is None else self.run_growth.saturated,
                 "responding_mode_hz": None if self.responding is None else self.unstable_hz[self.responding],
             },
@@ -332,10 +335,17 @@ def _vibration(lam: complex) -> str:
 
 
 def likeness(
-    verdict: str, dominant: float | None, mac: float | None, *, unstable: bool, mode_hz: float | None = None
-) -> str:
+    verdict: str, dominant: float | None, mac: float | None, *, unstable: bool, mode_hz: float | None = None,
+    below_hz: float | None = None,
+) -> str:  # fmt: skip
     """The verdict of one μ with what the full run answers, in the shape of an unstable mode, at the frequency mode_hz
-    of one where there is no shape to compare (None: of none), or at the frequency of none of those there are."""
+    of one where there is no shape to compare (None: of none), or at the frequency of none of those there are; below_hz:
+    where something slower is stronger than that line, which the run is too short to tell."""
+    if dominant is not None and below_hz is not None:
+        return (
+            f"{verdict}; the full run is too short to say what it answers with: what swings or drifts below "
+            f"{readable(below_hz, 4)} Hz is stronger than its line at {readable(dominant, 4)} Hz"
+        )
     if dominant is not None and mac is None and mode_hz is not None:
         return (
             f"{verdict}; the full run answers at {readable(dominant, 4)} Hz, within {100 * NEAR:g} % of the unstable "

@@ -177,7 +177,7 @@ def agreement_table(comparison: Comparison) -> Table:
                     quantity(mode, 1),
                     quantity(heard, 1),
                     percent(error),
-                    "an unstable mode responds" if mode is not None else "no unstable mode within 5 %",
+                    _responds(comparison.stronger_below_hz, mode),
                 )
             )
         )
@@ -205,6 +205,12 @@ def agreement_table(comparison: Comparison) -> Table:
     )
     heads = ("", "modal", "temporal", "difference", "")
     return Table(f"agreement-{comparison.mu:g}", title, heads, tuple(rows), frozenset({0, 4}), caption)
+
+
+def _responds(below_hz: float | None, mode_hz: float | None) -> str:
+    if below_hz is not None:
+        return f"what is slower than {quantity(below_hz, 1)} Hz is stronger"
+    return "an unstable mode responds" if mode_hz is not None else "no unstable mode within 5 %"
 
 
 def _likeness(mac: float) -> str:

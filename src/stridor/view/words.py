@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..agreement import GOOD_FREQUENCY, GOOD_GROWTH
+from ..agreement import GOOD_FREQUENCY, GOOD_GROWTH, stronger_below
 from ..case import Case
 from ..case.matrix_checks import MU
 from ..case.schema import Load
 from ..digits import measured
+from ..study.run_summary import slower_is_stronger
 from ..study.saturation import Unsaturated
 from ..temporal.changes import changes_of
 from .body_words import body_words, contact_words
@@ -166,7 +167,10 @@ def _run_sentence(inputs: ReportInputs) -> str:
         )
     text += f"{'s' if len(shares) > 1 else ''} {_listed(shares)}"
     if inputs.dominant_hz is not None:
-        text += f"; the dominant frequency is {measured(inputs.dominant_hz, 0)} Hz"
+        below = stronger_below(run, inputs.max_frequency_hz)
+        name = "dominant frequency" if below is None else "strongest line"
+        text += f"; the {name} is {'' if below is None else 'at '}{measured(inputs.dominant_hz, 0)} Hz"
+        text += "" if below is None else f", but {slower_is_stronger(below)}"
     if inputs.unsaturated is not None:
         text += f". {_growing_words(inputs.unsaturated)}"
     changed = changes_of(run)
