@@ -128,7 +128,7 @@ def test_a_search_is_stopped_amid_a_motion(start: Any) -> None:
     end = told.wait(*ENDS)
     assert time.monotonic() - asked < 5.0
     assert told.parts[-1][0] == "stopped"
-    assert end["sentence"] == "no limit cycle was found"
+    assert end["sentence"] == "the search was stopped before any limit cycle was found"
     assert not any("motion 2 of " in words for words in told.all("log"))
 
 
