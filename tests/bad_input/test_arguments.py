@@ -32,8 +32,11 @@ CASE = mode_coupling(0.02, 0.1)
         (lambda: st.ensemble(paper_case(), cores=0), "cores: 0 – a whole number ≥ 1, or None for all"),
         (lambda: st.modes(CASE, 0.5, count=0), "count: 0 – a whole number ≥ 1"),
         (lambda: st.modes(CASE, 0.5, count=-2), "count: -2 – a whole number ≥ 1"),
-        (lambda: st.cycles(CASE, 1.0, push=0.0), "push: 0.0 – finite speeds above or below 0 [m/s]"),
-        (lambda: st.cycles(CASE, 1.0, push=[0.1, 0.0]), "push: [0.1, 0.0] – finite speeds above or below 0 [m/s]"),
+        (lambda: st.cycles(CASE, 1.0, push=0.0), "push: 0.0 – finite speeds above or below 0 [m/s], up to 1e+100"),
+        (
+            lambda: st.cycles(CASE, 1.0, push=[0.1, 0.0]),
+            "push: [0.1, 0.0] – finite speeds above or below 0 [m/s], up to 1e+100",
+        ),
         (lambda: st.rank_countermeasures(CASE, mu=1.2, verify=-1), "verify: -1 – a whole number ≥ 0"),
         (lambda: st.rank_countermeasures(CASE, mu=1.2, chamfers=-1), "chamfers: -1 – a whole number ≥ 0"),
         (
