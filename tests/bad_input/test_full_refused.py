@@ -78,6 +78,8 @@ def test_time_loops_take_constant_matrices(tmp_path: Path, call):
         f"symmetric; the time loop takes constant matrices only; {WORKS}"
     )
     assert message(st.run, model(tmp_path), tmp_path / "out").startswith("run: factors of imported matrices depend on mu")
+    gyroscopic = model(tmp_path, (np.array([[0.0, 1.0], [-1.0, 0.0]]), "damping", ""))
+    assert "depend on mu, and the damping matrix is not symmetric; the time loop" in message(call, gyroscopic)
 
 
 @pytest.mark.parametrize("call", [st.simulate, st.compare, st.run])

@@ -177,6 +177,18 @@ def test_a_page_of_matrices_that_no_time_loop_takes(tmp_path: Path, nothing_comp
         st.run(st.load(path), tmp_path / "case.out")
 
 
+def test_an_onset_that_was_sought_with_damping_alone_is_not_set_beside_itself(tmp_path: Path) -> None:
+    """Of matrices nothing is sought without damping: the captions say nothing of what it would be."""
+    path = written(tmp_path)
+    page = page_of(st.report(path, mu=0.3, skip=["sensitivities", "countermeasures"])).replace("\u00a0", " ")
+    assert "Growth begins at μ = 0.10" in page
+    assert "without damping" not in page.partition('id="figure-damped-growth-pair"')[2].partition("</figcaption>")[0]
+    said = " ".join(stridor("report", path.name, "--mu", "0.3", "--skip", "countermeasures", cwd=tmp_path).stdout.split())
+    assert said.endswith("Next: stridor countermeasures case.toml --mu 0.3")
+    said = " ".join(stridor("report", path.name, "--mu", "0.05", "--skip", "countermeasures", cwd=tmp_path).stdout.split())
+    assert said.endswith("Next: stridor modes case.toml --mu 0.05")
+
+
 @pytest.mark.parametrize("verb", ["shapes", "steady"])
 def test_what_has_no_places_is_refused_before_anything_is_computed(tmp_path: Path, verb: str, nothing_computed: Any) -> None:
     done = stridor(verb, written(tmp_path).name, cwd=tmp_path)

@@ -43,7 +43,7 @@ def write_shapes(
     _require_places(system)
     if not work.has_shapes:
         raise CaseError("bodies", None, "point masses alone, which have no shape to draw; `stridor modes` and `stridor "
-                        "report` need none")
+                        "report` do without")
     modes = analyses.modes(work, mu, max_frequency_hz=work.modal.max_frequency_hz, vectors="right")
     if band_hz is not None and branches is None:
         modes = modes.between(*band_hz)
@@ -58,7 +58,7 @@ def _require_places(system: System) -> None:
     if not system.solids and not system.lines:
         raise CaseError(
             "bodies", None, "no places of nodes, so there is nothing to draw; bodies.NAME.mesh gives them to matrices, "
-            "and `stridor modes` and `stridor report` need none"
+            "and `stridor modes` and `stridor report` do without"
         )  # fmt: skip
 
 

@@ -265,11 +265,12 @@ def report(
     from .pipeline import report as write
 
     kept, friction = _kept(call, work, fresh=fresh), call.one_friction(mu)
-    _told(call, write(work, call.folder, mu=friction, log=call.say, skip=skip, fresh=fresh, kept=kept), work)
+    _told(call, write(work, call.folder, mu=friction, log=call.say, skip=skip, fresh=fresh, kept=kept), work, mu)
 
 
-def _told(call: Call, outcome: Outcome, work: Workspace) -> None:
-    """The verdict and where the page is, or the document of all of it."""
+def _told(call: Call, outcome: Outcome, work: Workspace, mu: str | None = None) -> None:
+    """The verdict and where the page is, or the document of all of it; then what makes sense next at that friction
+    coefficient (mu: as it was given): the growing modes drawn, or what quietens them where they have no shape."""
     from .output import stdout
 
     if call.json:
@@ -285,7 +286,10 @@ def _told(call: Call, outcome: Outcome, work: Workspace) -> None:
             stdout.print(f"report: {outcome.report}")
         stdout.print(outcome.verdict)
         if not outcome.interrupted:
-            call.suggest("shapes" if work.has_shapes else "countermeasures")
+            own = ("--mu", mu) if mu is not None else ()
+            modes = outcome.everything.own
+            growing = modes is None or bool((modes.unstable & modes.in_band).any())
+            call.suggest("shapes" if work.has_shapes else "countermeasures" if growing else "modes", *own)
     if outcome.interrupted:
         raise typer.Exit(130)
 

@@ -144,7 +144,9 @@ def _written(work: Workspace, model: ExportedModel, folder: Path, form: Format) 
 
 def _meaning(name: str, model: ExportedModel) -> str:
     if model.mu is not None and name in ("C", "K"):
-        return f"{'damping' if name == 'C' else 'stiffness'}, contact and friction at mu = {model.mu!r} in it"
+        what = "damping" if name == "C" else "stiffness"
+        within = f"contact and friction at mu = {model.mu!r} in it" if model.contacts else f"at mu = {model.mu!r}"
+        return f"{what}, {within}"
     return _MEANING[name]
 
 
@@ -186,7 +188,8 @@ def _contacts(model: ExportedModel) -> str:
 def _case(work: Workspace, model: ExportedModel, form: Format) -> str:
     """A case file of the matrices beside it."""
     title = (work.given.title if work.given is not None else "") or "a model"
-    at = "" if model.mu is None else f", friction at mu = {model.mu!r} in K"
+    friction = "friction at mu = {!r} in K" if model.contacts else "at mu = {!r}"
+    at = "" if model.mu is None else f", {friction.format(model.mu)}"
     lines = [
         f"# Matrices that stridor has exported. {FREEDOMS} says what their rows are, {LABELS} as stridor reads it.",
         f"title = {_quoted(f'{title}, as matrices{at}')}",

@@ -241,7 +241,8 @@ class Workspace(Shown):
             unsaid = mu is None and MU not in case.parameters and not case.contacts
             beyond = self.system(case.modal.friction_range[1]).not_symmetric_definite if unsaid else ""
             if what in ("compare", "run") or beyond:
-                why = f", and beyond mu = 0 {beyond}" if beyond else ""
+                always = beyond and self.system(0.0).not_symmetric_definite
+                why = f", and {'' if always else 'beyond mu = 0 '}{beyond}" if beyond else ""
                 raise AnalysisError(
                     f"{what}: factors of imported matrices depend on mu{why}; the time loop takes constant matrices "
                     f"only; {self._works()}"

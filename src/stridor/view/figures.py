@@ -117,15 +117,22 @@ def _damped_pair(inputs: ReportInputs, modes: ComplexModes, onset: Onset) -> Ite
     yield ReportFigure(
         "damped-growth-pair",
         f"Growth rates of modes {a} and {b}, with structural damping",
-        "Re λ of the damped pair; positive grows." + where + _beside_undamped(crossing, onset),
+        "Re λ of the damped pair; positive grows." + where + _beside_undamped(crossing, _of_pair(inputs, onset)),
         f"Growth rates of modes {a} and {b} over friction, one becoming positive.",
         plots.growth_branches(modes, onset.branches),
     )
 
 
-def _beside_undamped(damped: Onset | None, undamped: Onset) -> str:
-    """What damping does to an onset, which it may put off or, where it takes more of one mode, bring on."""
-    if damped is None:
+def _of_pair(inputs: ReportInputs, onset: Onset) -> Onset | None:
+    """Where the modes of an onset meet without damping, None where that was not sought or they do not."""
+    known = inputs.undamped_onsets.onsets if inputs.undamped_onsets is not None else ()
+    return next((o for o in known if set(o.branches) == set(onset.branches) and not o.stabilising), None)
+
+
+def _beside_undamped(damped: Onset | None, undamped: Onset | None) -> str:
+    """What damping does to an onset, which it may put off or, where it takes more of one mode, bring on; nothing of
+    one that was not sought without it."""
+    if damped is None or undamped is None:
         return ""
     without = f"without damping the two meet at μ = {measured(undamped.mu, 5)}"
     if measured(damped.mu, 5) == measured(undamped.mu, 5):
