@@ -153,7 +153,6 @@ def of_countermeasures(result: Countermeasures, value_of: Callable[[str], float]
         said = f"best: {best.words}, takes {readable(best.verified.removed, 4)} 1/s away, solved again; {rest}"
     # Of numbers those first that were solved again: a prediction may not hold.
     numbers = [m for m in result.helpful if m.kind == "number"]
-    numbers = [m for m in numbers if m.verified is not None or best.verified is None]
     number = min(numbers, key=lambda m: m.verified is None, default=None)
     if number is None:
         return Conclusion(said)
