@@ -115,6 +115,49 @@ def test_parts_put_together_are_the_whole(grid: st.Study, whole, tmp_path: Path)
     assert merged(tmp_path, tmp_path / "study.zarr", grid.model_copy(update={"restart_failed": True})) == []
 
 
+def test_parts_of_several_versions_are_not_put_together_without_a_word(tmp_path: Path) -> None:
+    """Nor is what they say lost: of numbers without effect, of lost workers."""
+    from stridor.studies.merge import merged
+
+    study = st.Study(case=mode_coupling(0.02), parameters={"mu": {"values": (0.8, 1.2)}, "temporal.step": {"values": (1e-3,)}})
+    for number in (1, 2):
+        st.run_study(study, tmp_path, workers=1, part=Part(number, 2))
+    OpenStore.opened(tmp_path / "part-2-of-2" / "study.zarr", variables("modes")).note(programs=["9.9.9 of-the-future"])
+    with pytest.raises(CaseError, match=r"parts that different versions of stridor computed \(.*, 9\.9\.9 of-the-future\), which may"):
+        merged(tmp_path, tmp_path / "study.zarr", study)
+    assert not (tmp_path / "study.zarr").exists()
+    told = merged(tmp_path, tmp_path / "study.zarr", study, go_on=True)
+    assert told[0].startswith("put together from parts that different versions")
+    assert told[1].startswith("temporal.step has the one value 0.001 in all samples")
+    found = st.open_study(tmp_path)
+    assert json.loads(found.data.attrs["provenance"])["programs"][1] == "9.9.9 of-the-future"
+    assert json.loads(found.data.attrs["without_effect"]) == told[1:]
+
+
+def test_parts_take_no_rows_away_that_they_do_not_have(tmp_path: Path) -> None:
+    """Of another study, of the same one computed as a whole; nor is what is there touched for a damaged part."""
+    from stridor.studies.merge import merged
+
+    grid = st.Study(case=mode_coupling(0.02), parameters={"mu": {"values": (0.8, 0.9, 1.1, 1.2)}})
+    other, place = grid.model_copy(update={"compute": "onsets"}), tmp_path / "study.zarr"
+    st.run_study(grid, tmp_path, workers=1, part=Part(1, 2))
+    st.run_study(other, tmp_path, workers=1)
+    with pytest.raises(CaseError, match="is of another study than the parts; move it away, or remove it"):
+        merged(tmp_path, place, grid)
+    assert st.open_study(tmp_path).done.all()
+    shutil.rmtree(place)
+    st.run_study(grid, tmp_path, workers=1)
+    with pytest.raises(CaseError, match="has 2 rows that are in none of the parts; move it away"):
+        merged(tmp_path, place, grid)
+    st.run_study(grid, tmp_path, workers=1, part=Part(2, 2))
+    assert merged(tmp_path, place, grid) == []
+    chunk = tmp_path / "part-2-of-2" / "study.zarr" / "growth_rate" / "c" / "0" / "0"
+    chunk.write_bytes(chunk.read_bytes() + b"x")
+    with pytest.raises(CaseError, match="a chunk of growth_rate is damaged"):
+        merged(tmp_path, place, grid)
+    assert st.open_study(tmp_path).done.all()
+
+
 def test_a_goal_is_not_pursued_in_parts_and_that_is_said(case: st.Case, tmp_path: Path) -> None:
     from stridor.studies.merge import merged
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -73,3 +74,36 @@ def test_rows_are_those_of_local_workers_and_a_lost_worker_loses_none(scheduler,
     assert found.done.all()
     for name in ("growth_rate", "frequency_hz", "unstable_modes"):
         assert np.array_equal(found.data[name].values, here.data[name].values, equal_nan=True)
+
+
+def test_a_scheduler_that_takes_the_connection_and_says_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that was stopped does so; the library waits for its answer without end."""
+    from stridor.studies import cluster
+
+    monkeypatch.setattr(cluster, "PATIENCE", 1.0)
+    study = st.Study(case=st.loads(template_text("two-beams"), FEW), parameters={"mu": {"values": (0.1,)}}, answers={"source": "full"})
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
+        with pytest.raises(st.AnalysisError, match=rf"{address} does not answer within 1 s \(it takes the connection and says nothing\)"):
+            st.run_study(study, tmp_path, scheduler=address)
+
+
+def test_that_all_workers_are_gone_is_said(scheduler, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And a study that waits for others can be left at once. The last test: it kills all workers."""
+    from stridor.studies import cluster
+
+    class Left(Exception): ...
+
+    def say(line: str) -> None:
+        if "workers of" in line or "worker of" in line:
+            for process in scheduler[1]:
+                if process.poll() is None:
+                    os.killpg(process.pid, signal.SIGKILL)
+        if line.startswith("warning: "):
+            assert line.startswith(f"warning: the scheduler {scheduler[0]} has no workers any more; rows wait until some come")
+            raise Left
+
+    monkeypatch.setattr(cluster, "PATIENCE", 3.0)
+    study = st.Study(case=st.loads(template_text("two-beams"), FEW), parameters={"mu": {"range": (0.0, 0.6), "points": 30}}, answers={"source": "full"})
+    with pytest.raises(Left):
+        st.run_study(study, tmp_path, scheduler=scheduler[0], say=say)

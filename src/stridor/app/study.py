@@ -44,7 +44,7 @@ def study(
     ] = None,
     merge: Annotated[bool, typer.Option("--merge", help="Put the parts together that --part wrote.")] = False,
     go_on: Annotated[
-        bool, typer.Option("--go-on", help="Go on with a store that another version of stridor has begun.")
+        bool, typer.Option("--go-on", help="Also with a store, or with parts, of another version of stridor.")
     ] = False,
 ) -> None:
     """Many samples of one case: maps, probability of squeal, what decides it. Goes on where it was."""
@@ -65,7 +65,7 @@ def study(
     if "mu" in loaded.parameters or loaded.compute == "onsets":
         call.warn(Workspace(loaded.base()).one_for_all)
     if merge:
-        result = _merged(call, loaded)
+        result = _merged(call, loaded, go_on=go_on)
     else:
         if one is None:
             call.claim()
@@ -86,13 +86,13 @@ def _run(
         )  # fmt: skip
 
 
-def _merged(call: Call, study: Study) -> StudyResult:
+def _merged(call: Call, study: Study, *, go_on: bool) -> StudyResult:
     from ..studies.merge import merged
     from ..studies.result import open_study
     from ..studies.run import NAME
 
     call.claim()
-    call.warn(merged(call.folder, call.folder / NAME, study))
+    call.warn(merged(call.folder, call.folder / NAME, study, go_on=go_on))
     return open_study(call.folder / NAME)
 
 

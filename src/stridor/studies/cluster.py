@@ -6,49 +6,77 @@ that it names, and the reduced model, must be found under the same path by all w
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
+import logging
+import queue
+import time
 import warnings
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from ..errors import AnalysisError
 from .rows import Row
 from .task import SampleBatch, Task, answered, died, program
 
-PATIENCE = 15.0  # seconds for a scheduler to answer
+PATIENCE = 15.0  # seconds for a scheduler to answer, and without any worker until that is said
+LOOK = 0.5  # seconds between looks at what came, at Ctrl-C and at whether anybody computes
 AHEAD = 2  # batches that each worker is given at a time
 TRIES = 3
 
 
 class ClusterWorkers:
-    """The workers that a scheduler has, those that join later too. A context. Raises AnalysisError where distributed is
-    not installed, the scheduler does not answer, it has no workers, or one has another stridor."""
+    """The workers that a scheduler has, those that join later too. A context. say is told where nobody computes any
+    more. Raises AnalysisError where distributed is not installed, the scheduler does not answer, it has no workers, or
+    one has another stridor."""
 
-    def __init__(self, task: Task, address: str) -> None:
-        self.task, self.address, self.lost = task, address, 0
+    def __init__(self, task: Task, address: str, say: Callable[[str], None] = lambda _: None) -> None:
+        self.task, self.address, self.lost, self._say = task, address, 0, say
         self._distributed = _distributed()
+        self._levels = _quiet()
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # of versions, which are compared below
-                self._client = self._distributed.Client(address, timeout=PATIENCE, set_as_default=False)
-        except Exception as error:  # of many kinds, by transport
-            raise AnalysisError(
-                f"the scheduler {address} does not answer within {PATIENCE:g} s ({_first_line(error)}): is it running, "
-                "and can it be reached from here?"
-            ) from None
-        try:
+            self._client = self._connected()
             self.count = self._checked()
         except BaseException:
-            self._client.close()
+            self._close()
             raise
+
+    def _connected(self) -> Any:
+        """Raises AnalysisError for a scheduler that does not answer."""
+        try:
+            with ThreadPoolExecutor(1) as apart:  # a notebook has a loop of its own running
+                apart.submit(asyncio.run, _answering(self.address)).result()
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of versions, which are compared below
+                return self._distributed.Client(self.address, timeout=PATIENCE, set_as_default=False)
+        except Exception as error:  # of many kinds, by transport
+            why = _first_line(error) if str(error) else "it takes the connection and says nothing"
+            raise AnalysisError(
+                f"the scheduler {self.address} does not answer within {PATIENCE:g} s ({why}): is it running, and can "
+                "it be reached from here?"
+            ) from None
+
+    def _close(self) -> None:
+        """Leave the cluster, which may not hear it any more."""
+        if hasattr(self, "_client"):
+            with contextlib.suppress(Exception):
+                self._client.close(timeout=2)
+        for name, level in self._levels.items():
+            logging.getLogger(name).setLevel(level)
 
     def _checked(self) -> int:
         """How many threads of workers there are. Raises AnalysisError for none, and for another stridor."""
-        threads = sum(self._client.nthreads().values())
+        try:
+            threads = sum(self._client.nthreads().values())
+            others = self._client.run(_program, on_error="return") if threads else {}
+        except Exception as error:  # of many kinds, by transport
+            raise AnalysisError(f"the scheduler {self.address} is gone: {_first_line(error)}") from error
         if not threads:
             raise AnalysisError(f"the scheduler {self.address} has no workers: start some (dask worker {self.address})")
         own = program()
-        for worker, other in self._client.run(_program, on_error="return").items():
+        for worker, other in others.items():
             if isinstance(other, OSError):
                 continue  # it has just died; whoever comes in its place is asked with its first batch
             if isinstance(other, BaseException):
@@ -73,14 +101,14 @@ class ClusterWorkers:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._client.close()
+        self._close()
 
     def answers(self, batches: Iterable[SampleBatch]) -> Iterator[dict[int, Row]]:
-        """Rows as batches are done. Raises AnalysisError where a worker has another stridor, or the scheduler is
-        gone."""
+        """Rows as batches are done, and none of them every now and then, for who looks at Ctrl-C. Raises AnalysisError
+        where a worker has another stridor, or the scheduler is gone."""
         waiting, again = iter(batches), deque[SampleBatch]()
         running: dict[Any, SampleBatch] = {}
-        done = self._distributed.as_completed(loop=self._client.loop)
+        done, heard = queue.SimpleQueue[Any](), time.monotonic()
         while True:
             while len(running) < AHEAD * self.count:
                 batch = again.popleft() if again else next(waiting, None)
@@ -88,11 +116,32 @@ class ClusterWorkers:
                     break
                 future = self._client.submit(_answered, self.task, batch, pure=False)
                 running[future] = batch
-                done.add(future)
+                future.add_done_callback(done.put)
             if not running:
                 return
-            future = next(done)
+            try:
+                future = done.get(timeout=LOOK)
+            except queue.Empty:
+                if time.monotonic() - heard > PATIENCE:
+                    heard = self._looked()
+                yield {}
+                continue
+            heard = time.monotonic()
             yield self._taken(future, running.pop(future), again)
+
+    def _looked(self) -> float:
+        """Say so where nobody computes; returns when that was looked at."""
+        ends = "Ctrl-C ends the study with what is done"
+        try:
+            known = self._client.sync(self._client.scheduler.ncores, callback_timeout=5)
+        except Exception:  # whatever keeps it from answering
+            self._say(f"warning: the scheduler {self.address} does not answer; rows wait for it ({ends})")
+        else:
+            if not known:
+                self._say(
+                    f"warning: the scheduler {self.address} has no workers any more; rows wait until some come ({ends})"
+                )
+        return time.monotonic()
 
     def _taken(self, future: Any, batch: SampleBatch, again: deque[SampleBatch]) -> dict[int, Row]:
         """The rows of a task; of one that kills its workers, or was lost, another try row by row."""
@@ -110,6 +159,27 @@ class ClusterWorkers:
                 return died(batch)
             again.extend(batch.alone())
             return {}
+
+
+def _quiet() -> dict[str, int]:
+    """Have the library log nothing: a scheduler that is gone is told by us, once. Returns the levels that were."""
+    names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]
+    levels = {name: logging.getLogger(name).level for name in names}
+    for name in names:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    return levels
+
+
+async def _answering(address: str) -> None:
+    """Have a scheduler say who it is. Raises TimeoutError where it takes the connection and does not, as one does that
+    was stopped: the library waits for that without end."""
+    from distributed.core import rpc
+
+    async def asked() -> None:
+        async with rpc(address) as scheduler:
+            await scheduler.identity(n_workers=0)
+
+    await asyncio.wait_for(asked(), PATIENCE)
 
 
 def _program() -> str:

@@ -125,7 +125,7 @@ class _Run:
             self.say("all rows are there")
         task = self._task(case, store) if self._open_rows(store.status).size else None
         while task is not None:
-            with _workers(task, workers, scheduler) as who:
+            with _workers(task, workers, scheduler, self.say) as who:
                 self.say(f"{who.words}")
                 self._answer(store, who)
             store.note(lost_workers=(store.told("lost_workers") or 0) + who.lost)
@@ -358,9 +358,9 @@ def differing(before: Mapping[str, Any], study: Study) -> str:
     return f"{what} differ{'s' if len(names) < 2 else ''}"
 
 
-def _workers(task: Task, count: int | None, scheduler: str | None) -> Workers:
+def _workers(task: Task, count: int | None, scheduler: str | None, say: Callable[[str], None]) -> Workers:
     if scheduler is None:
         return LocalWorkers(task, count or available_cores())
     from .cluster import ClusterWorkers
 
-    return ClusterWorkers(task, scheduler)
+    return ClusterWorkers(task, scheduler, say)
