@@ -358,6 +358,69 @@ def test_a_helix_in_a_bore_keeps_its_speed():
     assert found.velocity[late, 0, 1] == pytest.approx(answer[1], rel=1e-4)
 
 
+def in_a_meshed_bore(radius, facets, *, angle=0.0, velocity=(0.0, 0.0, 0.0)):
+    """A point mass of 1 kg in a bore along y of so many linear facets around, off the middle of their length."""
+    from stridor.contact.facets import FacetSurface
+
+    around = 2 * np.pi * np.arange(facets) / facets
+    points = radius * np.array([[math.cos(t), y, math.sin(t)] for y in (-0.2, 0.2) for t in around])
+    quads = np.array([[k, (k + 1) % facets, facets + (k + 1) % facets, facets + k] for k in range(facets)])
+    master = FacetSurface.from_facets(points, {"quad": quads}, where="contacts.bore.master")
+    assert master.locate(np.array([[0.5 * radius, 0.0, 0.0]])).gap[0] > 0, "it faces inwards"
+    rows = Rows(sp.csr_array(np.eye(3)), np.zeros((3, 0)))
+    start = radius * np.array([math.sin(angle), 0.03, -math.cos(angle)])
+    contact = pair_surface(
+        "bore", where="contacts.bore", slave=rows, slave_position=start[None], area=np.ones(1),
+        slave_normals=np.zeros((1, 3)), master=master,
+        master_rows=Rows(sp.csr_array((3 * len(points), 3)), np.zeros((3 * len(points), 0))),
+        drift=np.zeros((1, 3, 0)), adjust=True, stiffness_per_area=np.inf, law=Coulomb(0.0), sliding="finite",
+    )  # fmt: skip
+    system = replace(masses(mass=1.0), surfaces=(contact,), points={"mass": rows})
+    return replace(system, initial_velocity=np.array(velocity))
+
+
+@pytest.mark.parametrize("facets", [24, 96])
+def test_linear_facets_press_as_the_curve_does_whatever_the_step(facets):
+    """The polygon has edges; offsets that faded over steps followed it, by blows of up to 260 times the force."""
+    radius, angle, off = 0.09, 1.0, []
+    system = in_a_meshed_bore(radius, facets, angle=angle)
+    answer = scipy.integrate.solve_ivp(
+        lambda _, y: [y[1], -GRAVITY / radius * math.sin(y[0])], (0, 0.08), [angle, 0.0], rtol=1e-10, dense_output=True
+    ).sol
+    for step in (1e-4, 1.25e-5):
+        found = simulate_assembled(system, one_phase(0.08), Settings(step=step, record_every=1, watch=("mass",)))
+        theta, rate = answer(found.time)
+        true = GRAVITY * np.cos(theta) + radius * rate**2
+        settled = found.time > 0.005
+        assert found.normal_force[settled].min() > 0.0
+        off.append(np.sqrt(np.mean((found.normal_force[settled, 0] - true[settled]) ** 2)) / true.max())
+    assert max(off) < 0.06  # 3 and 5 % of 24 facets, where blows of the edges made it 100 % and more
+
+
+def test_a_point_mass_does_not_know_how_large_the_model_is():
+    """It stands for no length: forces in a bore of a tenth of the size are those of the large one times ten."""
+    found = []
+    for radius in (0.09, 0.009):
+        system = replace(in_a_meshed_bore(radius, 48, velocity=[1.5, 0.0, 0.0]), loads={})
+        settings = Settings(step=2e-3 * radius, record_every=1, watch=("mass",))
+        found.append(radius * simulate_assembled(system, one_phase(2.0 * radius), settings).normal_force[5:, 0])
+    assert found[0].min() > 0.5 * 1.5**2
+    assert np.abs(found[1] / found[0] - 1.0).max() < 1e-6
+
+
+def test_a_restart_stays_on_its_wall_of_a_bore():
+    """To the bit, wherever round it: the search from where the node was first found ends on the far wall, a diameter
+    away along the same normal."""
+    system = replace(in_a_meshed_bore(0.09, 48, velocity=[1.5, 0.0, 0.0]), loads={})
+    settings = Settings(step=2e-4, record_every=1, watch=("mass",))
+    whole = simulate_assembled(system, one_phase(0.3), settings)
+    for part in (0.08, 0.14, 0.2):  # 76, 134 and 191 degrees
+        first = simulate_assembled(system, one_phase(part), settings)
+        again = simulate_assembled(system, one_phase(0.3), settings, restart=first)
+        assert np.array_equal(again.normal_force, whole.normal_force)
+        assert np.array_equal(again.displacement, whole.displacement)
+
+
 def test_leaving_the_master_ends_the_run(monkeypatch):
     """A node beyond an edge: what, where, when, what to do, and the motion up to there."""
     from stridor.temporal.steppers.sparse import renewal

@@ -2,7 +2,7 @@
 
 They are renewed before any node has slid a thousandth of the distance between nodes, and between renewals follow the
 master's curvature (`bends`). Where a node in contact is found at another gap than the loop left it at, the difference
-becomes an offset that fades over a hundred steps: no kick enters the motion.
+becomes an offset that fades as it slides on: no kick enters the motion.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ....contact.curve import Curve
+from ....contact.facets import FacetSurface
 from ....contact.nodes import ContactNodes, stack
 from ....contact.obstacles import Cylinder
 from ....contact.pairing import repair
@@ -19,12 +21,13 @@ from ....contact.surfaces import SurfaceContact
 from ....system import System
 from ....typing import Array, IntArray
 from .bends import TURN, Turning
-from .machine import Machine
+from .machine import OFFSET_STEPS, Machine
 
 SLIDE = 1e-3  # of the distance between nodes
 MOST_STEPS = 200
 PROBE = 1e-4  # of that distance: behind which the master's normal is looked at again
 KINK = 1e-2  # rad over it: an edge, not a curve
+FADES_OVER = 2.0  # distances between nodes of the master
 
 
 # Under a name of its own: the one thing here that knows geometry.
@@ -109,25 +112,79 @@ def take_over(
 
 
 def node_distances(system: System) -> Array:
-    """Typical distance [m] between the slave nodes of each surface, or the size of what a single node stands for."""
+    """Typical distance [m] between the slave nodes of each surface; of a single node that between the master's nodes,
+    or the size of what it stands for where that is less. A point mass has none: any number of metres would make the
+    answer depend on how large the model is."""
     found: list[float] = []
     for surface in system.surfaces:
         position = surface.slave_position
         if len(position) > 1:
-            found.append(float(np.median(cKDTree(position).query(position, k=2)[0][:, 1])))
+            found.append(_apart(position))
         else:
             found.append(float(surface.area[0]) ** (1.0 / (position.shape[1] - 1)))
+            if isinstance(surface.master, Curve | FacetSurface):
+                found[-1] = min(found[-1], _apart(surface.master.positions))
         if isinstance(surface.master, Cylinder):
             found[-1] = min(found[-1], surface.master.radius)
     return np.array(found)
 
 
+def _apart(positions: Array) -> float:
+    """Typical distance [m] between neighbours of points (m, d)."""
+    return float(np.median(cKDTree(positions).query(positions, k=2)[0][:, 1]))
+
+
+def found_on(surfaces: tuple[SurfaceContact, ...]) -> IntArray:
+    """Facets (m,) that the slave nodes of all surfaces were found on, where the next search begins."""
+    return np.concatenate([np.zeros(0, dtype=np.int64), *(surface.location.facet for surface in surfaces)])
+
+
+def put_on(surfaces: tuple[SurfaceContact, ...], facets: IntArray) -> tuple[SurfaceContact, ...]:
+    """The same surfaces, their next search to begin at facets (m,) from `found_on`."""
+    ends = np.cumsum([surface.nodes.count for surface in surfaces])[:-1]
+    each = zip(surfaces, np.split(facets, ends), strict=True)
+    return tuple(replace(s, location=replace(s.location, facet=facet.copy())) for s, facet in each)
+
+
+def last_facets(surfaces: tuple[SurfaceContact, ...]) -> IntArray:
+    """The highest number (m,) that each of `found_on` can have."""
+    each = [np.zeros(0, dtype=np.int64)]
+    for surface in surfaces:
+        master = surface.master
+        pieces = master.stencils if isinstance(master, Curve) else getattr(master, "facets", (0,))
+        each.append(np.full(surface.nodes.count, len(pieces) - 1))
+    return np.concatenate(each)
+
+
+def facet_distances(system: System) -> Array:
+    """Typical distance [m] between the nodes of each surface's master, infinite where that is no mesh."""
+    meshed = [s.master if isinstance(s.master, Curve | FacetSurface) else None for s in system.surfaces]
+    return np.array([np.inf if master is None else _apart(master.positions) for master in meshed])
+
+
+def fading(machine: Machine, facets: Array) -> float:
+    """What is left of gap offsets after a step at the present speeds: they fade over a way of `FADES_OVER` facets (of
+    facets (k,) [m]), and over no fewer than a hundred steps. Over steps alone they would follow the polygon of linear
+    facets ever more closely the shorter the step, each of whose edges is a blow."""
+    speed, points = np.linalg.norm(_slip(machine), axis=1), len(machine.system.contacts)
+    ways = [0.0]
+    for k, surface in enumerate(machine.system.surfaces):
+        if surface.sliding == "finite":
+            fastest = float(speed[machine.nodes.owner == points + k].max(initial=0.0))
+            ways.append(fastest * machine.scheme.step / (FADES_OVER * facets[k]))
+    return 1.0 - min(1.0 / OFFSET_STEPS, max(ways))
+
+
+def _slip(machine: Machine) -> Array:
+    """Slip velocities (m, d−1) [m/s] of all nodes."""
+    nodes, q = machine.nodes, machine.fields.q[machine.layout.index]
+    return np.asarray(nodes.tangent @ q + nodes.tangent_lift @ machine.state.motion[1]).reshape(nodes.count, -1)
+
+
 def steps_to_renewal(machine: Machine, distances: Array, last: int) -> int:
     """Steps until a node of a finitely sliding surface has slid far enough at its present speed, or its normal turned;
     at most twice as many as the ``last`` time, for what starts from rest does not stay at its speed."""
-    nodes = machine.nodes
-    q = machine.fields.q[machine.layout.index]
-    slip = (nodes.tangent @ q + nodes.tangent_lift @ machine.state.motion[1]).reshape(nodes.count, -1)
+    nodes, slip = machine.nodes, _slip(machine)
     speed = np.linalg.norm(slip, axis=1)
     turned = np.linalg.norm(np.einsum("mjk,mk->mj", machine.turning.rate, slip), axis=1)
     points = len(machine.system.contacts)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ....errors import AnalysisError, CaseError
@@ -27,7 +29,18 @@ from .limit import step_limit_assembled
 from .loop import NOT_FINITE
 from .machine import Machine, assembled_machine, diagonal_mass
 from .records import SKEW_COLUMNS, buffers, node_history
-from .renewal import node_distances, renew, steps_to_renewal, take_over, turning
+from .renewal import (
+    facet_distances,
+    fading,
+    found_on,
+    last_facets,
+    node_distances,
+    put_on,
+    renew,
+    steps_to_renewal,
+    take_over,
+    turning,
+)
 from .start import begin
 
 # What moves on from step to step, by the part of the machine that holds it.
@@ -71,9 +84,12 @@ class SparseStepper:
         self.parts = sketch(machine.system, machine.nodes)
         self.finite = any(surface.sliding == "finite" for surface in machine.system.surfaces)
         self.distances = node_distances(machine.system) if self.finite else np.zeros(0)
+        self.facets = facet_distances(machine.system) if self.finite else np.zeros(0)
         # Of the rows: the step of their next renewal, the first for finite sliding, and the steps since the last.
         self.renewal = np.array([0, 1])
         self.renewed_at = np.zeros(machine.system.size + len(machine.system.motion.names))
+        # Where that search began: from elsewhere it may end on the far wall of a bore.
+        self.renewed_from: Any = found_on(machine.surfaces)
 
     @property
     def system(self) -> System:
@@ -132,6 +148,7 @@ class SparseStepper:
         held: dict[str, Array] = {"renewal": self.renewal, "renewed_at": self.renewed_at}
         if self.finite:
             held |= {"turning_rate": machine.turning.rate, "turning_place": machine.turning.place}
+            held["renewed_from"] = self.renewed_from
         for part, names in SAVED.items():
             held |= {f"{part}_{name}": getattr(getattr(machine, part), name) for name in names}
         return held
@@ -147,12 +164,13 @@ class SparseStepper:
             "state_counters": (0, INFINITY),
             "state_statistics": (-1.0, INFINITY),
             "renewal": (np.array([0, 1]), INFINITY),
+            **({"renewed_from": (0, last_facets(self.machine.surfaces))} if self.finite else {}),
         }
 
     def check(self, restart: Trajectory) -> None:
         """Freedoms are freedoms, whatever the bodies. Raises CaseError for finite sliding as older versions had it."""
-        if self.finite and "turning_rate" not in restart.state:
-            accepted = "start it anew: contacts that slide finitely now follow the curvature of their masters"
+        if self.finite and "renewed_from" not in restart.state:
+            accepted = "start it anew: of contacts that slide finitely it does not say on which facets its nodes were"
             raise CaseError("restart", "a run of an older version of stridor", accepted)
 
     def resume(self, restart: Trajectory, schedule: Schedule, *, changed: bool) -> None:
@@ -164,7 +182,8 @@ class SparseStepper:
             # Rows as they were last found: first at that displacement, then the state itself.
             machine.fields.u[machine.layout.index] = restart.state["renewed_at"][:size]
             machine.state.motion[0] = restart.state["renewed_at"][size:]
-            surfaces, nodes, _ = renew(machine, machine.surfaces)
+            start = np.asarray(restart.state["renewed_from"], dtype=np.int64)
+            surfaces, nodes, _ = renew(machine, put_on(machine.surfaces, start))
             take_over(machine, surfaces, nodes, Turning.none(nodes))
         for name, held in self._moving().items():
             held[:] = restart.state[name]
@@ -211,6 +230,7 @@ class SparseStepper:
 
     def _renew(self, phase: str) -> None:
         machine = self.machine
+        self.renewed_from[:] = found_on(machine.surfaces)
         surfaces, nodes, lost = renew(machine, machine.surfaces)
         if len(lost):
             at = self.done * self.scheme.step
@@ -221,6 +241,7 @@ class SparseStepper:
                 f"t = {at:.6g} s (phase {phase}); shorten the phase, slow the support down or make the master larger"
             )
         take_over(machine, surfaces, nodes, turning(machine, surfaces, nodes, self.distances))
+        machine.state.reference[1] = fading(machine, self.facets)
         interval = steps_to_renewal(machine, self.distances, int(self.renewal[1]))
         self.renewal[:] = self.done + interval, interval
         self.renewed_at[:] = np.concatenate([machine.displacement, machine.state.motion[0]])
