@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import AnalysisError
-from ..periodic import Cycle, CycleBranch, CycleOnset, bifurcations, follow, turning
+from ..periodic import ROUND, Cycle, CycleBranch, CycleOnset, bifurcations, follow, turning
 from .cycle_methods import Method
 
 Kept = Callable[[], bool]
@@ -133,6 +133,9 @@ class Tracer:
                 self._follow(
                     branch, traced, closed, heading, "along its branch", include=False, others=others, joins=joins
                 )
+            if traced.ends.startswith(ROUND):  # all of it is there: the other way leads over the same cycles
+                traced.begins = traced.ends
+                break
             if sense < 0.0:
                 traced.reverse()
         if traced.onset is None:
