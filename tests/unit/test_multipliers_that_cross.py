@@ -29,6 +29,12 @@ TOLD = {
     "up to what decides nothing": ([(-0.9, 0.1), (-1.0, 0.1), (-0.9, 0.1)], [], []),
     "at a fold": ([(0.9, 0.1), (1.0, 0.1), (1.1, 0.1)], [1], []),
     "at a fold, where it meets the motion's own": ([(1.1, 0.1), (1.0001 + 1e-4j, 0.1), (0.9, 0.1)], [1], []),
+    "at a fold, behind which it meets the one before": (
+        [(1.3, 0.9), (1.008, 0.997), (1.002 + 0.016j, 1.002 - 0.016j), (0.98 + 0.09j, 0.98 - 0.09j)],
+        [1], [("torus", 2, 3)],
+    ),
+    "one that meets another beyond at once": ([(1.2, 0.9), (1.1 + 0.1j, 1.1 - 0.1j)], [], [("branching", 0, 1)]),
+    "one at -1 that does": ([(-1.2, -0.9), (-1.1 + 0.1j, -1.1 - 0.1j)], [], [("period doubling", 0, 1)]),
     "at a fold, and another": ([(0.9, -0.9), (1.0, -0.95), (1.2, -1.1)], [1], [("period doubling", 0, 2)]),
     "two at once, one of them unsure": (
         [(-0.9, 0.9), (-1.2, 1.0), (-1.2, 1.1)], [], [("period doubling", 0, 1), ("branching", 0, 2)],

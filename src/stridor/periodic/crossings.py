@@ -65,11 +65,12 @@ def _passed(cycles: Sequence[Cycle], number: int) -> list[Crossed]:
     before = next(c for c in cycles[-2::-1] if c.outside is not None)
     inner, outer = (before, last) if number > 0 else (last, before)
     values = _crossing(inner.multipliers, outer.multipliers, abs(number))
-    # Beside a fold one comes close to the motion's own, as pairs do, of which that one was taken away.
-    mates = np.abs(values.conj()[:, None] - outer.multipliers[None, :]).min(axis=1)
+    # A pair passes with both. One alone passed as a real one, at 1 or -1, before it met another beyond the circle, or,
+    # beside a fold, the motion's own, which was taken away.
+    mates = np.abs(values.conj()[:, None] - values[None, :]).min(axis=1)
     paired = (np.abs(values.imag) > REAL * np.abs(values)) & (mates < np.abs(values.imag))
     alone: list[Crossed] = ["period doubling" if value.real < 0.0 else "branching" for value in values[~paired]]
-    pairs: list[Crossed] = ["torus"] * ((int(paired.sum()) + 1) // 2)
+    pairs: list[Crossed] = ["torus"] * (int(paired.sum()) // 2)
     return alone + pairs
 
 
