@@ -101,7 +101,11 @@ def test_a_closed_branch_is_followed_once_round(start: float, sense: float):
 
 def test_a_branch_that_passes_its_first_mu_in_another_cycle_is_not_closed():
     circle, first = Circle(inwards=1e-3), Place.on(0.3)
-    end = follow(circle, first, circle.towards(first, 1.0), lambda closed, /, *, fold: True, most=60)
+
+    def seen(closed: Place, /, *, fold: bool) -> bool:
+        return True
+
+    end = follow(circle, first, circle.towards(first, 1.0), seen, most=60)
     assert end == "60 points were made"
 
 
@@ -111,9 +115,13 @@ def test_of_a_closed_branch_the_other_way_is_not_followed():
     def sampled(place: Any, said: str) -> Any:
         return SimpleNamespace(mu=place.mu, said=said)
 
-    method: Any = SimpleNamespace(
-        branch=lambda between: circle, sampled=sampled, lighter=lambda place: place, branch_seconds=float("inf")
-    )
+    def branch(between: Any) -> Circle:
+        return circle
+
+    def lighter(place: Any) -> Any:
+        return place
+
+    method: Any = SimpleNamespace(branch=branch, sampled=sampled, lighter=lighter, branch_seconds=float("inf"))
     tracer = Tracer(method, (0.0, 1.0), 200, lambda: True)
     traced = tracer.from_cycle(Place.on(0.3), "a push", ())
     assert traced.begins == traced.ends == f"it closes on itself at μ = {Place.on(0.3).mu:.6g}"
