@@ -134,6 +134,14 @@ def test_where_no_cycle_is_closed_in_between_nothing_is_claimed(cycle: Cycle):
     assert crossings([line.at(0.0), line.at(1.0)], []) == [("multipliers pass or jump, undecided", 0, 1)]
 
 
+def test_a_pair_and_a_real_one_that_pass_against_each_other_are_both_told(cycle: Cycle):
+    def multipliers(mu: float) -> tuple[complex, ...]:
+        return (1.09 - 0.2 * mu) * np.exp(2.6j), (1.09 - 0.2 * mu) * np.exp(-2.6j), -0.7 - 0.45 * mu
+
+    line = Line(cycle, multipliers, 2.0)
+    assert line.crossings() == [("torus", 0, 1), ("period doubling", 0, 1)]
+
+
 def test_one_beyond_where_the_other_end_has_none(cycle: Cycle):
     one = replace(cycle, multipliers=np.zeros(0, dtype=complex))
     other = replace(cycle, multipliers=np.array([-1.2], dtype=complex))

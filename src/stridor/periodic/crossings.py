@@ -17,7 +17,7 @@ Crossed = Literal[
 ]  # fmt: skip
 Halfway = Callable[[Cycle, Cycle], Cycle | None]  # the cycle of a branch in the middle of the μ of two others
 UNDECIDED: Crossed = "multipliers pass or jump, undecided"
-HALVINGS = 10
+HALVINGS, PARTS = 10, 6  # where contacts change in another way, and where one of a pair passes alone
 NEARER, STAYS = 0.2, 0.5  # of how far multipliers are apart, when the ends come nearer by 1/32: continuous, a jump
 REAL = 1e-6  # of a multiplier: its imaginary part where it is real
 
@@ -64,8 +64,10 @@ def _passed(cycles: Sequence[Cycle], number: int, halfway: Halfway | None) -> li
     last = cycles[-1]
     # Step by step multipliers go least far, so that each is found again.
     before = next(c for c in cycles[-2::-1] if c.outside is not None)
-    if "harmonic" in (before.method, last.method) or same_word(before, last):
-        return _smooth(before, last, number)
+    if "harmonic" in (before.method, last.method):
+        return _smooth(before, last, number, None)
+    if same_word(before, last):
+        return _smooth(before, last, number, halfway)
     assert last.outside is not None
     there = last.outside[0] if number > 0 else last.outside[1]
     left = number
@@ -74,7 +76,7 @@ def _passed(cycles: Sequence[Cycle], number: int, halfway: Halfway | None) -> li
         ends = _narrowed(before, last, there - left, left > 0, halfway)
         step = left if ends is None else _more(ends[-1][1], there - left, left > 0)
         step = min(step, left) if left > 0 else max(step, left)
-        found.extend([UNDECIDED] if ends is None else _judged(ends, step, stable=there in (left, left - step)))
+        found.extend([UNDECIDED] if ends is None else _judged(ends, step, halfway, stable=there in (left, left - step)))
         before, left = last if ends is None else ends[-1][1], left - step
     return found
 
@@ -101,15 +103,17 @@ def _more(cycle: Cycle, number: int, growing: bool) -> int:
     return max(low - number, 0) if growing else min(high - number, 0)
 
 
-def _judged(ends: Sequence[tuple[Cycle, Cycle]], number: int, *, stable: bool) -> list[Crossed]:
+def _judged(
+    ends: Sequence[tuple[Cycle, Cycle]], number: int, halfway: Halfway | None, *, stable: bool
+) -> list[Crossed]:
     """What passes between the last two of narrowing ends: by kind where contacts change alike in both, or multipliers
     get nearer as the ends do; with the contacts where they stay as far apart. stable: before or behind."""
     one, other = ends[-1]
     if same_word(one, other):
-        return _smooth(one, other, number)
+        return _smooth(one, other, number, halfway)
     last, before = (_moved(*pair, number) for pair in (ends[-1], ends[-1 - HALVINGS // 2]))
     if last <= NEARER * before:
-        return _smooth(one, other, number)
+        return _smooth(one, other, number, halfway)
     if last < STAYS * before:
         return [UNDECIDED]
     if stable:
@@ -124,14 +128,22 @@ def _moved(one: Cycle, other: Cycle, number: int) -> float:
     return float(np.abs(went - came).max(initial=0.0))
 
 
-def _smooth(one: Cycle, other: Cycle, number: int) -> list[Crossed]:
-    """What passes between two cycles whose multipliers are continuous from one to the other."""
+def _smooth(one: Cycle, other: Cycle, number: int, halfway: Halfway | None, halvings: int = PARTS) -> list[Crossed]:
+    """What passes between two cycles whose multipliers are continuous from one to the other; where one of a pair passes
+    alone, from cycles closed in between, as the pair may have passed and a real one the other way."""
     inner, outer = (one, other) if number > 0 else (other, one)
     values = _crossing(inner.multipliers, outer.multipliers, abs(number))[1]
     # A pair passes with both. One alone passed as a real one, at 1 or -1, before it met another beyond the circle, or,
     # beside a fold, the motion's own, which was taken away.
     mates = np.abs(values.conj()[:, None] - values[None, :]).min(axis=1)
-    paired = (np.abs(values.imag) > REAL * np.abs(values)) & (mates < np.abs(values.imag))
+    own = np.abs(values.imag) > REAL * np.abs(values)
+    paired = own & (mates < np.abs(values.imag))
+    middle = halfway(one, other) if halfway is not None and halvings and np.any(own & ~paired) else None
+    counts = [c.outside for c in (one, middle, other) if c is not None]
+    sure = [count[0] for count in counts if count is not None and count[0] == count[1]]
+    if middle is not None and len(sure) == 3:
+        parts = ((one, middle, sure[1] - sure[0]), (middle, other, sure[2] - sure[1]))
+        return [k for a, b, more in parts if more for k in _smooth(a, b, more, halfway, halvings - 1)]
     alone: list[Crossed] = ["period doubling" if value.real < 0.0 else "branching" for value in values[~paired]]
     pairs: list[Crossed] = ["torus"] * (int(paired.sum()) // 2)
     return alone + pairs
