@@ -64,6 +64,9 @@ class Curve:
     def at(self, mu: float, one: Place, other: Place) -> Place:
         return Place(one.x + (mu - one.mu) / (other.mu - one.mu) * (other.x - one.x), mu)
 
+    def same(self, one: Place, other: Place, /) -> bool:
+        return abs(one.x - other.x) < 1e-6
+
     def vanished(self, point: Place, /) -> bool:
         return False
 

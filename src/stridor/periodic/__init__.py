@@ -2,7 +2,7 @@
 
 from .birth import born
 from .branch import Bifurcation, CycleBranch, bifurcations
-from .continuation import Followed, follow, turning, unfinished
+from .continuation import ROUND, Followed, follow, turning, unfinished
 from .cycle import Cycle
 from .cycles import CycleOnset, Cycles
 from .parting import Unclosed
@@ -13,6 +13,7 @@ from .shooting import ClosedShot, close, multipliers
 from .shooting_branch import ShootingBranch
 
 __all__ = [
+    "ROUND",
     "Bifurcation",
     "ClosedShot",
     "Cycle",

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from .crossings import crossings
+from .crossings import Halfway, crossings
 from .cycle import Cycle, same_word
 
 Kind = Literal[
     "fold", "period doubling", "torus", "branching", "stability changes with the contacts",
     "more of it grows with the contacts", "less of it grows with the contacts", "sticking begins",
     "sticking ends", "reversal of slip begins", "reversal of slip ends", "separation begins", "separation ends",
-    "contacts change in another order",
+    "contacts change in another order", "multipliers pass or jump, undecided",
 ]  # fmt: skip
 WORDS = {"stick": "sticking", "reversal": "reversal of slip", "separation": "separation"}
 
@@ -26,10 +26,12 @@ class Bifurcation:
     kind: "fold" (μ turns back), "period doubling" (a multiplier leaves or enters at −1), "torus" (a pair of them),
     "branching" (one at 1 without a fold), "stability changes with the contacts" (where contacts change in another way
     behind, multipliers jump), "more of it grows with the contacts" and "less of it grows with the contacts" (they jump,
-    and it is unstable before and behind), or what begins or ends: "sticking", "reversal of slip", "separation";
-    "contacts change in another order" where none of these does. harmonics: of a sticking or a reversal that
-    begins or ends by harmonic balance, those of the cycle that has it: they tell none that is shorter than one over
-    them of the period, so that shorter ones begin before and end behind; None elsewhere.
+    and it is unstable before and behind), "multipliers pass or jump, undecided" (contacts change in another way there,
+    and cycles closed in between do not tell whether multipliers jump or pass the circle), or what begins or ends:
+    "sticking", "reversal of slip", "separation"; "contacts change in another order" where none of these does.
+    harmonics: of a sticking or a reversal that begins or ends by harmonic balance, those of the cycle that has it: they
+    tell none that is shorter than one over them of the period, so that shorter ones begin before and end behind; None
+    elsewhere.
     """
 
     kind: Kind
@@ -83,10 +85,13 @@ class CycleBranch:
         }
 
 
-def bifurcations(cycles: Sequence[Cycle], folds: Sequence[int]) -> tuple[Bifurcation, ...]:
-    """What changes along cycles in the order of their branch; folds: which of them are folds."""
+def bifurcations(
+    cycles: Sequence[Cycle], folds: Sequence[int], halfway: Halfway | None = None
+) -> tuple[Bifurcation, ...]:
+    """What changes along cycles in the order of their branch; folds: which of them are folds; halfway: closes a cycle
+    of the branch in the middle of the μ of two others, None where it cannot."""
     found: list[Bifurcation] = []
-    crossed = crossings(cycles, folds)
+    crossed = crossings(cycles, folds, halfway)
     for k, cycle in enumerate(cycles):
         if k in folds:
             found.append(Bifurcation("fold", cycle.mu, cycle.mu, cycle.frequency_hz))

@@ -25,6 +25,7 @@ FLAT = 1e-4  # of a heading: a fold
 SAME = 1e-9  # of μ or the range: rounding
 HALVINGS = 14  # cycles between two others that are closed for one
 STOPPED = "it was stopped"
+ROUND = "it closes on itself"
 UNFINISHED = ("could not be followed", "could not be closed", "points were made", "of computing were over")
 
 
@@ -79,6 +80,10 @@ class Followed(Protocol[P]):
         """The cycle at a μ between two neighbours. Raises AnalysisError where none is near."""
         ...
 
+    def same(self, one: P, other: P, /) -> bool:
+        """Whether two cycles at one μ are the same, wherever their periods begin."""
+        ...
+
     def vanished(self, point: P, /) -> bool:
         """Whether the branch has come to steady sliding."""
         ...
@@ -108,10 +113,12 @@ def follow(
     seconds: float = math.inf,
     unsolved: Callable[[str], None] | None = None,
 ) -> str:
-    """Follow a branch from a cycle until it leaves the range; why it ended, STOPPED where ``seen`` said so. seconds: of
-    processor time, what ``seen`` takes included. unsolved: is told each fold that was passed and not closed."""
+    """Follow a branch from a cycle until it leaves the range or comes back to that cycle in the same direction, which
+    is told again as the last one; why it ended, STOPPED where ``seen`` said so. seconds: of processor time, what
+    ``seen`` takes included. unsolved: is told each fold that was passed and not closed."""
     low, high = branch.between
-    spot, length = BranchPoint(first, heading), FIRST
+    begun = spot = BranchPoint(first, heading)
+    length, away = FIRST, False
     until = clock.process_time() + seconds
     for _ in range(most):
         if clock.process_time() >= until:
@@ -128,17 +135,40 @@ def follow(
             return _to_the_edge(branch, spot, closed, seen)
         if branch.vanished(closed):
             return f"it comes to steady sliding at μ = {closed.mu:.6g}"
-        if spot.heading[-1] * tangent[-1] < 0.0:
-            fold = _fold(branch, spot, length, tangent)
+        turns = spot.heading[-1] * tangent[-1] < 0.0
+        fold = _fold(branch, spot, length, tangent) if turns else None
+        before = closed if fold is None else fold  # up to there μ goes on as it did
+        if away and (again := _again(branch, begun, spot.point, before, spot.heading)) is not None:
+            seen(again, fold=False)
+            return f"{ROUND} at μ = {first.mu:.6g}"
+        if turns:
             if fold is None and unsolved is not None:
                 unsolved(f"its fold near μ = {spot.mu:.6g} to {closed.mu:.6g} could not be closed, and is not marked")
             if fold is not None and not seen(fold, fold=True):
                 return STOPPED
+        if fold is not None and away and (again := _again(branch, begun, fold, closed, tangent)) is not None:
+            seen(again, fold=False)
+            return f"{ROUND} at μ = {first.mu:.6g}"
         if not seen(closed, fold=False):
             return STOPPED
+        away = True
         spot = BranchPoint(*branch.next_start(closed, tangent))
         length = min(length * 1.5, LARGEST)
     return f"{most} points were made"
+
+
+def _again(branch: Followed[P], begun: BranchPoint[P], one: P, other: P, heading: Array) -> P | None:
+    """The cycle that a branch began with, closed between two neighbours that μ passes it between as it did then; None
+    where it is another."""
+    if heading[-1] * begun.heading[-1] <= 0.0 or not min(one.mu, other.mu) <= begun.mu <= max(one.mu, other.mu):
+        return None
+    if one.mu == other.mu:
+        return None
+    try:
+        found = branch.at(begun.mu, one, other)
+    except (AnalysisError, np.linalg.LinAlgError):
+        return None
+    return found if branch.same(begun.point, found) else None
 
 
 def _tangent(branch: Followed[P], spot: BranchPoint[P], closed: P) -> Array:

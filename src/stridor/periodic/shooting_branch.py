@@ -20,6 +20,7 @@ from ..typing import Array
 from .chart import Chart
 from .continuation import BranchPoint
 from .problem import Family
+from .returns import same
 from .shooting import ENOUGH, ClosedShot, Shot, close, left, shoot, started
 
 BESIDE = 1e-6  # of the range: for differences by μ
@@ -130,6 +131,10 @@ class ShootingBranch:
         share = (mu - one.mu) / (other.mu - one.mu)
         xi = one.xi + share * (other.xi - one.xi)
         return close(self.family.at(mu), one.chart, xi, one.period + share * (other.period - one.period))
+
+    def same(self, one: ClosedShot, other: ClosedShot) -> bool:
+        """Whether two cycles at one μ are the same."""
+        return same(one, other)
 
     def vanished(self, closed: ClosedShot) -> bool:
         """Whether no contact changes any more."""

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import AnalysisError
-from ..periodic import Cycle, CycleBranch, CycleOnset, bifurcations, follow, turning
+from ..periodic import ROUND, Cycle, CycleBranch, CycleOnset, bifurcations, follow, turning
 from .cycle_methods import Method
 
 Kept = Callable[[], bool]
+Place = tuple[float, float]  # of a cycle on its branch: μ, period [s]
 
 
 @dataclass
@@ -32,6 +33,9 @@ class Traced:
     unsolved: list[str] = field(default_factory=list[str])
     reached_from: str = ""
     stays: list[tuple[float, int, int]] = field(default_factory=list[tuple[float, int, int]])
+    halves: dict[tuple[Place, Place], tuple[Any, Cycle] | None] = field(
+        default_factory=dict[tuple[Place, Place], "tuple[Any, Cycle] | None"]
+    )
 
     def add(self, closed: Any, said: str, *, fold: bool) -> None:
         """Another cycle behind the last."""
@@ -67,6 +71,29 @@ class Traced:
                     continue
                 yield k, again
 
+    def halfway(self, one: Cycle, other: Cycle) -> Cycle | None:
+        """Its cycle in the middle of the μ of two others, of itself or from here; None where none is closed that lies
+        between them. Each is closed once, as what was found is told again and again while a search goes on."""
+        low, high = sorted(((one.mu, one.period), (other.mu, other.period)))
+        if (low, high) not in self.halves:
+            self.halves[low, high] = self._closed_between(low, high)
+        found = self.halves[low, high]
+        return None if found is None else found[1]
+
+    def _closed_between(self, low: Place, high: Place) -> tuple[Any, Cycle] | None:
+        known = {(c.mu, c.period): closed for c, closed in zip(self.cycles, self.closed, strict=True)}
+        known |= {(kept[1].mu, kept[1].period): kept[0] for kept in self.halves.values() if kept is not None}
+        mu, period = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])
+        near = BESIDE * abs(high[1] - low[1]) + SAME * period
+        for start in (known[low], known[high]):
+            try:
+                again = self.method.again(start, mu)
+            except (AnalysisError, np.linalg.LinAlgError):
+                continue
+            if abs(again.period - period) <= near:
+                return self.method.lighter(again), self.method.sampled(again, "along its branch")
+        return None
+
     def kept_by(self, closed: Any) -> bool:
         """Note that a run stays in a cycle; False where the branch does not have it."""
         own = [(k, k) for k, one in enumerate(self.closed) if (one.mu, one.period) == (closed.mu, closed.period)]
@@ -79,11 +106,12 @@ class Traced:
         folds = turning([c.mu for c in self.cycles], [k for k, fold in enumerate(self.folds) if fold])
         return CycleBranch(
             tuple(range(first, first + len(self.cycles))), self.begins, self.ends, self.onset,
-            tuple(first + k for k in folds), bifurcations(self.cycles, folds), self.reached_from,
+            tuple(first + k for k in folds), bifurcations(self.cycles, folds, self.halfway), self.reached_from,
         )  # fmt: skip
 
 
 APART = 0.02  # of a period, between two neighbours of a branch
+BESIDE, SAME = 0.75, 1e-6  # of the difference of two periods, and of a period: how far from their middle one lies
 
 
 class Tracer:
@@ -133,6 +161,9 @@ class Tracer:
                 self._follow(
                     branch, traced, closed, heading, "along its branch", include=False, others=others, joins=joins
                 )
+            if traced.ends.startswith(ROUND):  # all of it is there: the other way leads over the same cycles
+                traced.begins = traced.ends
+                break
             if sense < 0.0:
                 traced.reverse()
         if traced.onset is None:

@@ -15,6 +15,7 @@ from ...typing import Array
 from ..continuation import BranchPoint
 from .balance import Evaluated, evaluated
 from .balanced import CLOSED, ENOUGH, Balanced, balanced, defect
+from .same import same_cycle
 
 CORRECTIONS = 16
 STEP = 0.3  # longest of Newton's method, in X
@@ -135,6 +136,10 @@ class HarmonicBranch:
         omega = first.omega + share * (second.omega - first.omega)
         guess = evaluated(first.family, first.z + share * (z - first.z), omega, mu, first.scales)
         return balanced(Balanced(guess))
+
+    def same(self, one: Balanced, other: Balanced) -> bool:
+        """Whether two cycles at one μ are the same."""
+        return same_cycle(one, other)
 
     def vanished(self, point: Balanced) -> bool:
         """Whether it has come to steady sliding."""
