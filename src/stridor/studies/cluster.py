@@ -36,6 +36,7 @@ class ClusterWorkers:
         self.task, self.address, self.lost, self._say = task, address, 0, say
         self._distributed = _distributed()
         self._levels = _quiet()
+        self._client: Any = None
         try:
             self._client = self._connected()
             self.count = self._checked()
@@ -60,7 +61,7 @@ class ClusterWorkers:
 
     def _close(self) -> None:
         """Leave the cluster, which may not hear it any more."""
-        if hasattr(self, "_client"):
+        if self._client is not None:
             with contextlib.suppress(Exception):
                 self._client.close(timeout=2)
         for name, level in self._levels.items():

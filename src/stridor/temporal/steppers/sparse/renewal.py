@@ -141,7 +141,7 @@ def found_on(surfaces: tuple[SurfaceContact, ...]) -> IntArray:
 
 def put_on(surfaces: tuple[SurfaceContact, ...], facets: IntArray) -> tuple[SurfaceContact, ...]:
     """The same surfaces, their next search to begin at facets (m,) from `found_on`."""
-    ends = np.cumsum([surface.nodes.count for surface in surfaces])[:-1]
+    ends = np.cumsum([len(surface.location.facet) for surface in surfaces])[:-1]
     each = zip(surfaces, np.split(facets, ends), strict=True)
     return tuple(replace(s, location=replace(s.location, facet=facet.copy())) for s, facet in each)
 
@@ -152,27 +152,28 @@ def last_facets(surfaces: tuple[SurfaceContact, ...]) -> IntArray:
     for surface in surfaces:
         master = surface.master
         pieces = master.stencils if isinstance(master, Curve) else getattr(master, "facets", (0,))
-        each.append(np.full(surface.nodes.count, len(pieces) - 1))
+        each.append(np.full(len(surface.location.facet), len(pieces) - 1))
     return np.concatenate(each)
 
 
 def facet_distances(system: System) -> Array:
-    """Typical distance [m] between the nodes of each surface's master, infinite where that is no mesh."""
+    """Typical distance [m] between the nodes of each surface's master, NaN where that is no mesh."""
     meshed = [s.master if isinstance(s.master, Curve | FacetSurface) else None for s in system.surfaces]
-    return np.array([np.inf if master is None else _apart(master.positions) for master in meshed])
+    return np.array([np.nan if master is None else _apart(master.positions) for master in meshed])
 
 
 def fading(machine: Machine, facets: Array) -> float:
     """What is left of gap offsets after a step at the present speeds: they fade over a way of `FADES_OVER` facets (of
     facets (k,) [m]), and over no fewer than a hundred steps. Over steps alone they would follow the polygon of linear
-    facets ever more closely the shorter the step, each of whose edges is a blow."""
+    facets ever more closely the shorter the step, each of whose edges is a blow; where no master is meshed there is
+    none, and a hundred steps serve."""
     speed, points = np.linalg.norm(_slip(machine), axis=1), len(machine.system.contacts)
-    ways = [0.0]
+    ways: list[float] = []
     for k, surface in enumerate(machine.system.surfaces):
-        if surface.sliding == "finite":
+        if surface.sliding == "finite" and np.isfinite(facets[k]):
             fastest = float(speed[machine.nodes.owner == points + k].max(initial=0.0))
             ways.append(fastest * machine.scheme.step / (FADES_OVER * facets[k]))
-    return 1.0 - min(1.0 / OFFSET_STEPS, max(ways))
+    return 1.0 - min(1.0 / OFFSET_STEPS, max(ways, default=1.0))
 
 
 def _slip(machine: Machine) -> Array:
