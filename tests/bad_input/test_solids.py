@@ -900,9 +900,9 @@ def test_a_body_that_nothing_holds() -> None:
 
 def test_loads_that_pull_the_bodies_apart() -> None:
     message = no_answer(changed(PLANE, "pressure = 1e6", "pressure = -1e6"))
-    # Which of the two depends on how the direct solver meets a singular matrix.
+    # Which of them depends on how the direct solver meets a singular matrix: without friction, or at its μ.
     free = f"steady sliding has no equilibrium: body slider can move freely under the loads; {LOOSE}"
-    assert message in (free, f"steady sliding: {unsettled(5, 60)}")
+    assert message in (free, f"steady sliding: {unsettled(5, 60)}", f"steady sliding at μ = 0.2: {unsettled(5, 60)}")
 
 
 def test_friction_that_jams() -> None:
