@@ -3,6 +3,7 @@ is told by the same words."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -117,3 +118,32 @@ def test_rows_of_very_different_size_and_unknowns_that_stay_zero() -> None:
     matrix = np.diag([1e-20, 1e20, 1.0]) + np.diag([0.5e-20, 0.3e20], 1)
     answer = solved(matrix, np.array([1e-20, 1e20, 0.0]))
     assert answer == pytest.approx([0.5, 1.0, 0.0])
+
+
+def test_where_none_touches_each_load_has_its_own_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(small, "SMALL", -1)
+    equilibrium, active = problem(4)
+    none = np.zeros(len(active), dtype=bool)
+    equilibrium.nodes = replace(equilibrium.nodes, cubic=np.zeros(len(active)))
+    loads = np.random.default_rng(5).normal(size=(3, len(equilibrium.force)))
+    for force, twice in ((loads[0], False), (loads[1], False), (loads[1], True), (loads[2], False), (loads[0], False)):
+        equilibrium.force = force
+        before = equilibrium.solved
+        state = equilibrium.solve(none)
+        assert state.displacement == pytest.approx(np.linalg.solve(equilibrium.system.stiffness.toarray(), force))
+        assert not state.normal_force.any()
+        assert equilibrium.solved == before + (not twice)
+
+
+def test_a_structure_loose_where_none_touches_is_so_every_time() -> None:
+    system = SimpleNamespace(
+        of_matrices=AnswerCache(), size=2, stiffness=sp.csr_array(np.diag([100.0, 0.0])), cubic=None,
+    )  # fmt: skip
+    rows = ContactRows(sp.csr_array(np.eye(2)), np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2, dtype=bool))
+    equilibrium = Equilibrium(system, rows, rows.normal, np.array([-1.0, -2.0]), symmetric=False, solver=None)
+    for _ in range(2):
+        with pytest.raises(SingularMatrix) as told:
+            equilibrium.solve(np.zeros(2, dtype=bool))
+        assert int(np.argmax(np.abs(told.value.motion))) == 1
+    assert equilibrium.solved == 1
+    assert equilibrium.solve(np.ones(2, dtype=bool)).normal_force == pytest.approx([1.0, 2.0])

@@ -55,12 +55,12 @@ def choose(asked: str | None) -> str:
     name = asked if asked is not None else os.environ.get(VARIABLE) or None
     if name is None:
         return next(_preferred())
+    if name in PACKAGES and installed(name):
+        return name
     present = tuple(known for known in PACKAGES if installed(known))
     if name not in PACKAGES:
         raise CaseError(where, name, f"no such solver; installed: {', '.join(present)}")
-    if name not in present:
-        raise CaseError(where, name, f"is not installed; {PACKAGES[name][1]}, or use one that is: {', '.join(present)}")
-    return name
+    raise CaseError(where, name, f"is not installed; {PACKAGES[name][1]}, or use one that is: {', '.join(present)}")
 
 
 def join() -> None:

@@ -8,6 +8,7 @@ is as good as a factorisation's, or it is not taken.
 
 from __future__ import annotations
 
+import os
 from collections import deque
 from collections.abc import Hashable, Sequence
 from functools import partial
@@ -17,10 +18,12 @@ import numpy as np
 import scipy.sparse.linalg as sla
 
 from ..typing import Array, Sparse
+from .backends import VARIABLE
 from .factor import BACKWARD_ERROR, Factor, SingularMatrix, Sizes, factorise
 from .updated import Updated
 
 LEAST = 3000  # unknowns from which on solving is so much cheaper than factorising that it pays
+SMALL = 1000  # unknowns up to which SuperLU answers, unless another is named: others spend more on the call than on it
 LARGEST = 600e6  # bytes of factors that are kept from one matrix to the next
 STEPS = 15  # of GMRES; where more are needed, factors of the matrix itself cost no more
 ENOUGH = 1e-13  # of the right side, by their estimate: what is left after a round of them
@@ -71,7 +74,9 @@ class Nearby:
             return found
         self.free()
         self.factorisations += 1
-        factor = factorise(matrix, symmetric=symmetric, saddle=saddle, solver=solver)
+        free = solver is None and VARIABLE not in os.environ
+        chosen = "superlu" if free and len(right) <= SMALL else solver
+        factor = factorise(matrix, symmetric=symmetric, saddle=saddle, solver=chosen)
         found = np.asarray(factor.solve(right))
         if len(right) < LEAST or factor.memory_bytes > LARGEST:
             factor.free()

@@ -26,6 +26,8 @@ NEWTON_STEPS = 60
 FEW = 8  # nodes of which all sets are tried, where the search among them does not settle
 NEARBY = "factors nearby"  # the question of `System.of_matrices` whose answer is a `direct.Nearby`
 BALANCED = 1e-14  # of the largest force: what an equilibrium by prepared factors may leave
+# What was asked, and the answer.
+_Open = tuple[tuple[bytes, int, str | None], tuple[Array, Array] | direct.SingularMatrix]
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,7 @@ class Equilibrium:
         if not springs and not np.any(nodes.cubic):
             if (found := self._by_prepared(active)) is not None:
                 return found
-            u, normal = self._linear(active, None, None)
+            u, normal = self._linear(active, None, None) if np.any(active) else self._open()
             return NodeEquilibrium(active, u, normal, nodes.gap + self._rows @ u)
         for _ in range(NEWTON_STEPS):
             before = u
@@ -127,6 +129,21 @@ class Equilibrium:
             "steady sliding: the springs beyond the linear find no equilibrium in "
             f"{NEWTON_STEPS} steps; check their coefficients (softening springs may have none)"
         )
+
+    def _open(self) -> tuple[Array, Array]:
+        """Displacement and forces where no node touches, which are the same at every friction: the last is kept, also
+        that nothing holds the structure then."""
+        last = self.system.of_matrices.once("where none touches", dict[str, _Open])
+        asked, known = (self.force.tobytes(), self.nodes.count, self.solver), last.get("")
+        if known is None or known[0] != asked:
+            try:
+                known = asked, self._linear(np.zeros(self.nodes.count, dtype=bool), None, None)
+            except direct.SingularMatrix as error:
+                known = asked, error.with_traceback(None)
+            last[""] = known  # in one step, as several threads may ask
+        if isinstance(known[1], direct.SingularMatrix):
+            raise direct.SingularMatrix(str(known[1]), known[1].motion)
+        return known[1]
 
     def _by_prepared(self, active: BoolArray) -> NodeEquilibrium | None:
         """The equilibrium by the factors that many share; None where there are none, or not as good as its own."""
