@@ -189,11 +189,19 @@ def test_an_onset_that_was_sought_with_damping_alone_is_not_set_beside_itself(tm
     assert said.endswith("Next: stridor modes case.toml --mu 0.05")
 
 
-@pytest.mark.parametrize("verb", ["shapes", "steady"])
-def test_what_has_no_places_is_refused_before_anything_is_computed(tmp_path: Path, verb: str, nothing_computed: Any) -> None:
+@pytest.mark.parametrize(
+    ("verb", "said"),
+    [
+        ("shapes", "bodies: no places of nodes, so there is nothing to draw; "),
+        ("steady", "contacts: none, and no places of nodes, so there is no contact force to tell and nothing to draw; "),
+    ],
+)
+def test_what_has_no_places_is_refused_before_anything_is_computed(
+    tmp_path: Path, verb: str, said: str, nothing_computed: Any
+) -> None:
     done = stridor(verb, written(tmp_path).name, cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.replace("\n", " ").startswith("stridor: bodies: no places of nodes, so there is nothing to draw; ")
+    assert done.stderr.replace("\n", " ").startswith(f"stridor: {said}")
 
 
 def test_matrices_that_follow_friction_are_swept_once(tmp_path: Path) -> None:

@@ -100,6 +100,18 @@ def test_of_what_diverges_no_number_in_time_is_told(coupled: Case):
     assert row["growth_error"] is None
 
 
+def test_of_what_does_not_grow_no_error_of_growth_is_told():
+    """Without damping, below its onset: the mode's growth is none but for rounding, and nothing is told over it."""
+    found = st.compare(mode_coupling(0.0).with_({"contacts.rub.friction.coefficient": 0.3, "comparison.critical": False}))
+    (one,) = found.comparisons
+    assert one.agrees
+    assert abs(one.modal_eigenvalue.real) < 1e-12
+    assert one.to_json()["growth_rate_error"] is None
+    heads, rows = found.table()
+    assert dict(zip(heads, rows[0], strict=True))["growth_error"] is None
+    assert np.isnan(found.to_xarray()["growth_rate_error"].values[0])
+
+
 def test_a_shape_in_the_span_of_two_is_all_theirs():
     rng = np.random.default_rng(3)
     pair = rng.standard_normal((9, 2)) + 1j * rng.standard_normal((9, 2))

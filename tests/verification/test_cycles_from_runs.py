@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import scipy.signal
@@ -109,3 +111,42 @@ def test_most_small_benches_have_the_motion_of_their_run():
         met += any(hits)
     assert counted >= 15
     assert met >= 0.6 * counted
+
+
+PRESSED = """
+units = "nondimensional"
+[bodies]
+m = { type = "mass", mass = 1.0, position = [0, 0] }
+jaw = { type = "mass", mass = 1.0, position = [0, 1] }
+belt = { type = "obstacle", shape = "flat", point = [0, 0], normal = [0, 1], sliding = { velocity = [0.2, 0] } }
+[supports.jaw]
+at = "jaw"
+fixed = ["x", "y"]
+displacement = { y = -0.01 }
+[springs]
+k = { between = ["m", "ground"], direction = [1, 0], stiffness = 1.0 }
+s = { between = ["m", "jaw"], direction = [0, 1], stiffness = 100.0 }
+[contacts.rub]
+slave = "m"
+master = "belt"
+stiffness = 1e4
+friction = { law = "hyperbolic", coefficient = 0.3, static_coefficient = 0.4, delta = 3.0 }
+[modal]
+max_frequency_hz = 1.0
+[[phases]]
+name = "go"
+duration = 1.0
+"""
+
+
+def test_a_run_in_time_keeps_what_presses_by_a_distance(tmp_path: Path):
+    """One mass whose friction falls, pressed by a jaw that has moved. Period by its own integration, with a contact
+    that does not give: 6.44173."""
+    path = tmp_path / "pressed.toml"
+    path.write_text(PRESSED)
+    found = st.cycles(path, 0.3)
+    (cycle,) = found.cycles
+    assert cycle.reached_from.startswith(RUN)
+    assert cycle.period == pytest.approx(6.44173, rel=2e-3)
+    assert set(cycle.kinds) == {"slip", "stick"}
+    assert not [words for words in found.missing if RUN in words]

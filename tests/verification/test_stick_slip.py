@@ -263,8 +263,9 @@ def test_unloading_slips_back_in_an_annulus_of_its_own():
 PAD = Path(__file__).parent / "pad_at_an_abutment.toml"
 
 
-def dense_modes(system: System, found: SteadySliding, mu: float) -> np.ndarray:
-    """Eigenvalues by elimination of everything that contact holds, friction on the sliding nodes alone."""
+def dense_modes(system: System, found: SteadySliding, mu: float | np.ndarray) -> np.ndarray:
+    """Eigenvalues by elimination of everything that contact holds, friction on the sliding nodes alone; mu: of all
+    nodes, or of each (m, 1)."""
     nodes = system.contact_nodes()
     touch, stick, rigid = found.status != OPEN, found.status == STICK, nodes.compliance == 0.0
     normal, tangent = nodes.normal.toarray(), nodes.tangent.toarray()
@@ -297,6 +298,18 @@ def test_modes_hold_the_nodes_that_stick(stiffness):
     assert modes.eigenvalues[0] == pytest.approx(dense_modes(system, found, 0.4)[:6], rel=1e-7)
     assert f"{np.count_nonzero(found.status == STICK)} contact nodes stick" in modes.contact_state
     assert "at μ = 0.4" in modes.contact_state
+
+
+def test_modes_without_a_coefficient_have_that_of_a_contact_that_no_support_moves():
+    """The abutment sticks or slips by what the pad does, and has a coefficient of its own all the same."""
+    case = st.load(PAD).with_({"contacts.rub.stiffness": 1e13})
+    found, system = st.steady_sliding(case), st.build_system(case)
+    own = found.friction_coefficient[:, None]
+    assert set(own.ravel().tolist()) == {0.4, 0.6}
+    modes, together = st.modes(case, count=6), st.modes(case, 0.4, count=6)
+    assert modes.eigenvalues[0] == pytest.approx(dense_modes(system, found, own)[:6], rel=1e-7)
+    assert np.abs(modes.eigenvalues[0] / together.eigenvalues[0] - 1.0).max() > 1e-3
+    assert f"{np.count_nonzero(found.status == STICK)} contact nodes stick" in modes.contact_state
 
 
 def test_the_time_loop_rests_on_what_sticks_and_grows_as_the_modes_say():

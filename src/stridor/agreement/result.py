@@ -11,6 +11,7 @@ import numpy as np
 
 from ..digits import measured, readable
 from ..modal.onset import refuted
+from ..modal.tolerances import UNSTABLE_RELATIVE
 from ..notebook import Shown, html_table
 from ..tabular import Cell, Rows, Tabular, dataset, split
 from ..temporal.growth import Growth
@@ -72,6 +73,13 @@ class Comparison(Shown):
         """Whether a small perturbation was marched: not about what diverges without oscillating."""
         return not (self.unstable_hz and self.modal_eigenvalue.imag == 0.0)
 
+    @property
+    def told_growth_error(self) -> float | None:
+        """``growth_rate_error``; None where nothing was marched, or where the mode grows no more than rounding of its
+        eigenvalue."""
+        lam = self.modal_eigenvalue
+        return self.growth_rate_error if self.marched and abs(lam.real) > UNSTABLE_RELATIVE * abs(lam) else None
+
     def to_json(self) -> dict[str, Any]:
         """Plain values of one comparison."""
         modal, temporal, marched = self.modal_eigenvalue, self.perturbation.eigenvalue, self.marched
@@ -93,7 +101,7 @@ class Comparison(Shown):
                 "responding_mode_hz": None if self.responding is None else self.unstable_hz[self.responding],
             },
             "frequency_error": self.frequency_error if marched else None,
-            "growth_rate_error": self.growth_rate_error if marched else None,
+            "growth_rate_error": self.told_growth_error,
             "growth_mac": self.growth_mac,
             "mac": self.mac,
             "agrees": self.agrees,
@@ -140,7 +148,7 @@ class Agreement(Tabular):
         for c in self.comparisons:
             seen = c.perturbation.eigenvalue if c.marched else complex(np.nan, np.nan)
             ends = [(lam.imag / (2 * np.pi), lam.real) for lam in (c.modal_eigenvalue, seen)]
-            both = (c.frequency_error, c.growth_rate_error) if c.marched else (None, None)
+            both = c.frequency_error if c.marched else None, c.told_growth_error
             errors = *both, c.growth_mac, c.dominant_frequency_hz, c.mac
             rows.append((c.mu, *ends[0], *ends[1], *errors, c.agrees, c.verdict))
         if self.answers:
@@ -160,7 +168,7 @@ class Agreement(Tabular):
             "modal_eigenvalue": split(("mu",), [c.modal_eigenvalue for c in rows], {"units": "1/s"}),
             "temporal_eigenvalue": split(("mu",), [c.perturbation.eigenvalue for c in rows], {"units": "1/s"}),
             "frequency_error": ("mu", [c.frequency_error for c in rows], {"units": "1"}),
-            "growth_rate_error": ("mu", [c.growth_rate_error for c in rows], {"units": "1"}),
+            "growth_rate_error": ("mu", column([c.told_growth_error for c in rows]), {"units": "1"}),
             "growth_mac": ("mu", column([c.growth_mac for c in rows]), {"units": "1"}),
             "mac": ("mu", column([c.mac for c in rows]), {"units": "1"}),
             "dominant_frequency": ("mu", column([c.dominant_frequency_hz for c in rows]), {"units": "Hz"}),

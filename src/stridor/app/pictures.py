@@ -141,12 +141,18 @@ def _energy_pictures(system: System, energy: Array, path: Path) -> list[Path]:
 
 
 def write_steady(problem: Problem, steady: SteadySliding, folder: Path) -> list[Path]:
-    """Pressure of each contact as PNG, and displacement and pressure as VTK files."""
+    """Pressure of each contact as PNG, and displacement and pressure as VTK files; none without places of nodes."""
     from ..view.field_plots import contact_snapshot
 
     system = Workspace.of(problem).system()
-    _require_places(system)
     nodes = system.contact_nodes()
+    if not system.solids and not system.lines:
+        if nodes.count:
+            return []
+        raise CaseError(
+            "contacts", None, "none, and no places of nodes, so there is no contact force to tell and nothing to draw; "
+            "`stridor modes` and `stridor report` do without"
+        )  # fmt: skip
     history = NodeHistory(
         names=nodes.names,
         owner=nodes.owner,

@@ -156,10 +156,8 @@ class SettledRun:
         whole = dict.fromkeys(system.loads, 1.0), dict.fromkeys(system.motion.names, 1.0)
         still = {name for name, far in zip(system.motion.names, system.motion.full_distance, strict=True) if far}
         speeds = {name: 1.0 for name in whole[1] if name not in still}
-        phases = [
-            PhaseSpec(f"part {k}", length, whole[0], speeds, 0.0, dict.fromkeys(still, 1.0))
-            for k, length in enumerate(lengths, start=1)
-        ]
+        # Distances, of which nothing is said, are gone from the first part on.
+        phases = [PhaseSpec(f"part {k}", length, whole[0], speeds) for k, length in enumerate(lengths, start=1)]
         settings, phases = self._settings(system, mode, phases)
         run: Trajectory | None = None
         for k in range(len(phases)):

@@ -87,7 +87,10 @@ def cycles(
     if not (float(runs).is_integer() and runs >= 0):
         raise CaseError("runs", runs, "a whole number of runs in time, 0 for none")
     if work.varies:
-        raise CaseError("case", "matrices that depend on mu", "cycles of a system whose matrices do not")
+        raise AnalysisError(
+            "cycles: factors of imported matrices depend on mu, and friction in matrices neither sticks nor parts; "
+            "give it in [contacts], or take `stridor modes` and `stridor onsets`, which take such factors"
+        )
     if harmonics is not None and not (float(harmonics).is_integer() and 1 <= harmonics <= MOST_ASKED):
         raise CaseError("harmonics", harmonics, f"1 to {MOST_ASKED} harmonics")
     chosen = _chosen(work.system(), method, work.temporal.cutoff_hz)

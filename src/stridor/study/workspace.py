@@ -346,6 +346,7 @@ def frictions_in_sliding(system: System) -> Array:
     nodes = system.contact_nodes()
     nodes = nodes.select(nodes.share > 0.0)
     speeds = np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1)
-    # The centre of a turning surface slides at no speed and has no say.
+    # The centre of a turning surface slides at no speed and has no say, but what holds by sticking has.
     moving = speeds > 1e-9 * speeds.max(initial=0.0)
-    return nodes.friction_coefficients(speeds)[moving] if moving.any() else nodes.friction_coefficients(speeds)
+    moved = np.isin(nodes.owner, nodes.owner[moving])
+    return nodes.friction_coefficients(speeds)[moving | ~moved]
