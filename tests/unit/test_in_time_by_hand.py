@@ -30,7 +30,7 @@ from stridor.temporal.sketch import SketchPart
 from stridor.temporal.steppers.modal import ModalStepper, start
 from stridor.temporal.steppers.sparse import damping, limit, renewal, step_matrix, storage
 from stridor.temporal.steppers.sparse import machine as assembled_machine
-from stridor.temporal.steppers.sparse.bends import TURN
+from stridor.temporal.steppers.sparse.bends import TURN, Turning
 from stridor.temporal.steppers.sparse.node_table import sliding_directions
 
 # What NumPy warns of is a fault here, whatever comes of it.
@@ -451,7 +451,7 @@ def test_rows_are_renewed_before_a_node_has_slid_a_thousandth_of_their_distance(
         fields=SimpleNamespace(q=speeds), layout=SimpleNamespace(index=np.arange(4)),
         state=SimpleNamespace(motion=np.array([[5.0], [-4.0]])), scheme=SimpleNamespace(step=1e-4),
         system=SimpleNamespace(contacts=(1,), surfaces=[surface([[0, 0]]), surface([[0, 0]], sliding="small")]),
-        turning=SimpleNamespace(rate=np.zeros((4, 1, 1))),
+        turning=Turning(np.zeros((4, 1, 1)), np.zeros((4, 1)), sp.csr_array((4, 4)), np.zeros((4, 1)), np.zeros((4, 1))),
     )  # fmt: skip
     steps = renewal.steps_to_renewal(machine, np.array([4.2, 1e-9]), 150)
     assert steps == int(1e-3 * 4.2 / (0.5 * 1e-4)) == 84
