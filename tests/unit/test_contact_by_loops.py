@@ -22,11 +22,11 @@ from stridor.contact.coupling import (
     SlaveFacets,
     _areas,
     _dual,
-    point_weights,
     _shares,
     _values_of_basis,
     collocated,
     coupled,
+    point_weights,
 )
 from stridor.contact.curve import Curve
 from stridor.contact.facet_search import edge_coordinates, nearest_edges, shape_of

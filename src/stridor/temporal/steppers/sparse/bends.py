@@ -56,8 +56,8 @@ class Turning:
     def none(nodes: ContactNodes) -> Turning:
         """Of nodes whose normals stay."""
         m, t = nodes.count, nodes.directions
-        rows = sp.csr_array(nodes.tangent.shape)
-        return Turning(np.zeros((m, t, t)), np.zeros((m, t)), rows, np.zeros(nodes.tangent_lift.shape), np.zeros((m, t)))
+        tilt, lift = sp.csr_array(nodes.tangent.shape), np.zeros(nodes.tangent_lift.shape)
+        return Turning(np.zeros((m, t, t)), np.zeros((m, t)), tilt, lift, np.zeros((m, t)))
 
     @property
     def tilting(self) -> BoolArray:

@@ -1,8 +1,8 @@
 """Finite sliding of surfaces: rows and gaps found again as the bodies move over each other.
 
 They are renewed before any node has slid a thousandth of the distance between nodes, and between renewals follow the
-master's curvature and its own turning (`bends`). Where a node in contact is found at another gap than the loop left it at, the difference
-becomes an offset that fades as it slides on: no kick enters the motion.
+master's curvature and its own turning (`bends`). Where a node in contact is found at another gap than the loop left it
+at, the difference becomes an offset that fades as it slides on: no kick enters the motion.
 """
 
 from __future__ import annotations
