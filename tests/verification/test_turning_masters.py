@@ -17,6 +17,7 @@ from stridor.contact.joined import Joined
 from stridor.contact.pairing import pair_surface
 from stridor.laws import Coulomb
 from stridor.system import System
+from stridor.system.model import PrescribedMotion
 from stridor.temporal.settings import Settings
 from stridor.temporal.simulate import simulate
 
@@ -141,6 +142,43 @@ def test_a_bead_on_a_rocking_plate_whose_damping_couples_all():
     errors = [off(system, 0.02, step, path="nodal")[0] for step in (4e-5, 1e-5)]
     assert errors[0] < 3e-6
     assert errors[1] < 0.4 * errors[0]
+
+
+def test_a_bead_on_a_plate_that_a_support_turns():
+    """At a steady rate Ω: the plate is at y = Ω t x, and m ẍ = −Ω t L, m (Ω t ẍ + 2 Ω ẋ) = L − m g."""
+    rate, none = 0.8, np.zeros((2, 1))
+    positions, master = plate(2)
+    lift = np.zeros((2 * len(positions), 1))
+    lift[1::2, 0] = positions[:, 0]
+    bead = Rows(sp.csr_array(sp.eye_array(2)), none)
+    contact = pair_surface(
+        "plate", where="contacts.plate", slave=bead, slave_position=np.array([[START[0], 0.0]]),
+        slave_normals=np.zeros((1, 2)), area=np.full(1, 0.1), master=master,
+        master_rows=Rows(sp.csr_array((len(lift), 2)), lift), drift=np.zeros((1, 2, 1)), stiffness_per_area=np.inf,
+        law=Coulomb(0.0), sliding="finite", adjust=True,
+    )  # fmt: skip
+    one = np.zeros((1, 1))
+    system = System(
+        MASS * np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), (), {"weight": np.array([0.0, -MASS * GRAVITY])},
+        surfaces=(contact,), points={"bead": bead}, dimension=2,
+        motion=PrescribedMotion(("turn",), none, none, none, one, one, one),
+        initial_velocity=np.array([SPEED[0], rate * START[0]]),
+    )  # fmt: skip
+
+    def solved(t, y):
+        slope = rate * t
+        force = (GRAVITY + 2.0 * rate * y[1]) * MASS / (1.0 + slope**2)
+        return -slope * force / MASS, force * np.sqrt(1.0 + slope**2)
+
+    way = scipy.integrate.solve_ivp(
+        lambda t, y: [y[1], solved(t, y)[0]], (0, 0.02), [START[0], SPEED[0]], rtol=1e-11, atol=1e-12, dense_output=True
+    ).sol
+    for step in (4e-5, 1e-5):
+        settings = Settings(step=step, record_every=1, watch=("bead",))
+        found = simulate_assembled(system, one_phase(0.02, velocities={"turn": rate}), settings)
+        true = np.array([solved(t, way(t))[1] for t in found.time])
+        settled = found.time > 1e-3
+        np.testing.assert_allclose(found.normal_force[settled, 0], true[settled], rtol=5e-6)
 
 
 def test_a_node_of_two_parts_turns_with_the_plate_as_one():
