@@ -22,11 +22,11 @@ from stridor.contact.coupling import (
     SlaveFacets,
     _areas,
     _dual,
-    _point_weights,
     _shares,
     _values_of_basis,
     collocated,
     coupled,
+    point_weights,
 )
 from stridor.contact.curve import Curve
 from stridor.contact.facet_search import edge_coordinates, nearest_edges, shape_of
@@ -392,7 +392,7 @@ def test_points_of_a_master_weigh_its_nodes() -> None:
         np.array([[0, 2, 0], [1, 1, 0]]), np.array([[0.25, 0.75, 0.0], [0.5, 0.5, 0.0]]), np.zeros((2, 3)), np.zeros((2, 3)),
         np.array([0.1, 0.2]), np.zeros(2, dtype=int), np.ones(2, dtype=bool),
     )  # fmt: skip
-    assert _point_weights(location, 4).toarray() == pytest.approx(np.array([[0.25, 0, 0.75, 0], [0, 1, 0, 0]]))
+    assert point_weights(location, 4).toarray() == pytest.approx(np.array([[0.25, 0, 0.75, 0], [0, 1, 0, 0]]))
     single = collocated(location, np.array([3.0, 4.0]), 4)
     assert single.slave.toarray() == pytest.approx(np.eye(2))
     assert (single.area.tolist(), single.gap.tolist()) == ([3.0, 4.0], [0.1, 0.2])

@@ -30,7 +30,7 @@ from stridor.temporal.sketch import SketchPart
 from stridor.temporal.steppers.modal import ModalStepper, start
 from stridor.temporal.steppers.sparse import damping, limit, renewal, step_matrix, storage
 from stridor.temporal.steppers.sparse import machine as assembled_machine
-from stridor.temporal.steppers.sparse.bends import TURN
+from stridor.temporal.steppers.sparse.bends import TURN, Turning
 from stridor.temporal.steppers.sparse.node_table import sliding_directions
 
 # What NumPy warns of is a fault here, whatever comes of it.
@@ -451,7 +451,7 @@ def test_rows_are_renewed_before_a_node_has_slid_a_thousandth_of_their_distance(
         fields=SimpleNamespace(q=speeds), layout=SimpleNamespace(index=np.arange(4)),
         state=SimpleNamespace(motion=np.array([[5.0], [-4.0]])), scheme=SimpleNamespace(step=1e-4),
         system=SimpleNamespace(contacts=(1,), surfaces=[surface([[0, 0]]), surface([[0, 0]], sliding="small")]),
-        turning=SimpleNamespace(rate=np.zeros((4, 1, 1))),
+        turning=Turning(np.zeros((4, 1, 1)), np.zeros((4, 1)), sp.csr_array((4, 4)), np.zeros((4, 1)), np.zeros((4, 1))),
     )  # fmt: skip
     steps = renewal.steps_to_renewal(machine, np.array([4.2, 1e-9]), 150)
     assert steps == int(1e-3 * 4.2 / (0.5 * 1e-4)) == 84
@@ -463,6 +463,15 @@ def test_rows_are_renewed_before_a_node_has_slid_a_thousandth_of_their_distance(
     assert renewal.steps_to_renewal(machine, np.array([42.0, 1.0]), 150) == int(TURN / (8.0 * 0.5 * 1e-4))
     machine.system.surfaces[0].master = Cylinder(np.zeros(2), 1 / 8)
     assert renewal.steps_to_renewal(machine, np.array([1e-9, 1.0]), 150) == int(TURN / (8.0 * 0.5 * 1e-4))
+    # As a master turns itself, 2 rad/s with its speeds and 1 against them with its support, and one that only sticks.
+    tilt, lift = sp.csr_array(([-4.0], ([2], [2])), shape=(4, 4)), np.zeros((4, 1))
+    lift[2, 0] = 0.25
+    machine.turning = replace(machine.turning, tilt=tilt, tilt_lift=lift)
+    assert renewal.steps_to_renewal(machine, np.array([42.0, 1.0]), 150) == int(TURN / ((4.0 + 2.0 - 1.0) * 1e-4))
+    machine.turning = replace(machine.turning, rate=np.zeros((4, 1, 1)), tilt=10 * tilt)
+    machine.fields.q, machine.state.motion = np.array([0.0, 0.0, -0.5, 0.0]), np.zeros((2, 1))
+    machine.nodes.tangent = np.zeros((4, 4))
+    assert renewal.steps_to_renewal(machine, np.array([42.0, 1.0]), 150) == int(TURN / (20.0 * 1e-4))
     machine.fields.q = 0 * speeds
     machine.state.motion = np.zeros((2, 1))
     assert renewal.steps_to_renewal(machine, np.array([1e-9, 1.0]), 90) == 180

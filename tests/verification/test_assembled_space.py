@@ -478,7 +478,10 @@ def test_renewed_rows_go_on_with_the_gap_and_turn_the_friction_force():
     machine = SimpleNamespace(
         nodes=old, contacts=SimpleNamespace(force=force, offset=offset), displacement=u,
         state=SimpleNamespace(motion=[x]), set_nodes=lambda *args: given.extend(args), surfaces=None,
-        turning=Turning(np.tile(-np.outer(along, along) / radius, (m, 1, 1)), reached - way[:, None] * along),
+        turning=replace(
+            Turning.none(old), rate=np.tile(-np.outer(along, along) / radius, (m, 1, 1)),
+            place=reached - way[:, None] * along,
+        ),
     )  # fmt: skip
     turns = Turning.none(new)
     take_over(machine, ("new",), new, turns)

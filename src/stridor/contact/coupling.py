@@ -94,7 +94,7 @@ class SlaveFacets:
 def collocated(location: Location, area: Array, master_nodes: int) -> Coupling:
     """Each node by itself against the point of the master below it."""
     m = len(location.gap)
-    return Coupling(sp.csr_array(sp.eye_array(m)), _point_weights(location, master_nodes), area, location.gap)
+    return Coupling(sp.csr_array(sp.eye_array(m)), point_weights(location, master_nodes), area, location.gap)
 
 
 def coupled(
@@ -148,7 +148,8 @@ def _of_basis(mixture: Sparse, nodal: Array) -> Array:
     return nodal / own - (mixture - sp.diags_array(own)).T @ (nodal / own)
 
 
-def _point_weights(location: Location, nodes: int) -> Sparse:
+def point_weights(location: Location, nodes: int) -> Sparse:
+    """Weights (m, k) csr of the k nodes of a master in the points of a location on it."""
     m, r = location.weights.shape
     entries = (location.weights.ravel(), (np.repeat(np.arange(m), r), location.nodes.ravel()))
     found = sp.csr_array(entries, shape=(m, nodes))

@@ -41,7 +41,7 @@ class Joined:
 
     def even(self, location: Location, area: Array) -> Location:
         """The location with one normal for the parts (m,) of a node, turned to each: the mean by area."""
-        normal = _mean(self, np.einsum("mji,mj->mi", self.turns, location.normal), area)
+        normal = self.mean(area) @ np.einsum("mji,mj->mi", self.turns, location.normal)
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         normal = np.einsum("mij,mj->mi", self.turns, (normal / length)[self.into])
         # Those that are alone stay as they are to the last digit.
@@ -52,10 +52,17 @@ class Joined:
         """Tangents (m, d−1, d) of the first of each node, turned to all its parts."""
         return np.einsum("mij,mkj->mki", self.turns, tangents[self.first][self.into])
 
+    def mean(self, area: Array) -> Sparse:
+        """Means (q, m) csr of the parts (m,) of each node by area, evenly where none of them has any."""
+        total = np.bincount(self.into, weights=area)[self.into]
+        even = 1.0 / np.bincount(self.into)[self.into]
+        part = np.where(total > 0.0, area / np.where(total > 0.0, total, 1.0), even)
+        return sp.csr_array((part, (self.into, np.arange(len(area)))))
+
     def nodes(self, apart: ContactNodes) -> ContactNodes:
         """One node in place of its parts."""
         first, total = self.first, np.bincount(self.into, weights=apart.area)
-        mean = _weights(self, apart.area)
+        mean = self.mean(apart.area)
         by_direction = sp.csr_array(sp.kron(mean, sp.eye_array(apart.directions)))
         # One over the sum of the stiffnesses, and rigid where they are.
         with np.errstate(divide="ignore"):
@@ -118,17 +125,6 @@ def joined(freedoms: IntArray, normals: Array, bonds: Sequence[Bond]) -> Joined 
         return None
     into = np.unique(into, return_inverse=True)[1]
     return Joined(into, turns, np.unique(into[doubtful]).astype(np.int64))
-
-
-def _weights(by: Joined, area: Array) -> Sparse:
-    """Means (q, m) csr of the parts of each node by area, evenly where none of them has any."""
-    total = np.bincount(by.into, weights=area)[by.into]
-    part = np.where(total > 0.0, area / np.where(total > 0.0, total, 1.0), 1.0 / np.bincount(by.into)[by.into])
-    return sp.csr_array((part, (by.into, np.arange(len(area)))))
-
-
-def _mean(by: Joined, values: Array, area: Array) -> Array:
-    return np.asarray(_weights(by, area) @ values)
 
 
 def _csr(matrix: Sparse) -> Sparse:

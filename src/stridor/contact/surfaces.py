@@ -49,6 +49,11 @@ class SurfaceContact:
         """Which of ``nodes`` each slave node (m,) is."""
         return np.arange(len(self.slave_position)) if self.joined is None else self.joined.into
 
+    @property
+    def first(self) -> IntArray:
+        """The first slave node of each of ``nodes``."""
+        return np.arange(len(self.slave_position)) if self.joined is None else self.joined.first
+
     def rigid(self) -> SurfaceContact:
         """The same contact without compliance."""
         nodes = replace(self.nodes, compliance=np.zeros(self.nodes.count))
@@ -131,6 +136,11 @@ def operators(
         tangents=tangents,
     )
     return apart if joined is None else joined.nodes(apart)
+
+
+def rows_along(weights: Sparse, normals: Array) -> Sparse:
+    """Rows (m, n d) csr that take Σ_j weights (m, n) u_j of node i along its normal (m, d)."""
+    return _along(weights, normals[:, None, :])
 
 
 def _along(weights: Sparse, directions: Array) -> Sparse:

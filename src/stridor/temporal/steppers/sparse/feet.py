@@ -91,8 +91,8 @@ def follow_feet(x: Array, u: Array, table: NodeTable, nodes: NodeState, work: No
 
 @njit(cache=True, allocates=False)
 def _turned(base: Array, turn: Array, out: Array) -> None:  # pragma: no cover - compiled
-    """R base (d,): normal and tangents of one entry turned by R (d, d)."""
-    for j in range(base.shape[0]):
+    """P base (d,): normal and tangents of one entry out of its rows as they were found, base (w,), by P (d, w)."""
+    for j in range(turn.shape[0]):
         total = 0.0
         for o in range(base.shape[0]):
             total += turn[j, o] * base[o]
@@ -100,8 +100,9 @@ def _turned(base: Array, turn: Array, out: Array) -> None:  # pragma: no cover -
 
 
 @njit(cache=True, allocates=False)
-def _turn(angle: Array, turn: Array) -> None:  # pragma: no cover - compiled
-    """R = [c, θᵀ; −θ, 1 − θθᵀ/(1 + c)] (d, d), c² = 1 − θ²: the rotation of normal and tangents after which the normal
+def _turn(angle: Array, way: Array, turn: Array) -> None:  # pragma: no cover - compiled
+    """P (d, w) = R, and where w > d beside it that of the normal's row along the way (d − 1,) on the master, R e₁ sᵀ.
+    R = [c, θᵀ; −θ, 1 − θθᵀ/(1 + c)] (d, d), c² = 1 − θ²: the rotation of normal and tangents after which the normal
     has the part θ (d − 1,) of the tangents."""
     t, square = angle.shape[0], 0.0
     for j in range(t):
@@ -111,32 +112,40 @@ def _turn(angle: Array, turn: Array) -> None:  # pragma: no cover - compiled
         turn[0, j + 1], turn[j + 1, 0] = angle[j], -angle[j]
         for o in range(t):
             turn[j + 1, o + 1] = (1.0 if j == o else 0.0) - angle[j] * angle[o] / (1.0 + turn[0, 0])
+    for j in range(t + 1):
+        for o in range(t + 1, turn.shape[1]):
+            turn[j, o] = turn[j, 0] * way[o - t - 1]
 
 
 @njit(cache=True, allocates=False)
-def _away(k: int, x: Array, u: Array, table: NodeTable, work: NodeScratch) -> float:  # pragma: no cover - compiled
-    """What the rows that were found see of supports at x (p,) and a structure at u (size,) into work.away, the rotation
-    of normal and tangents there into work.turn; s·Ks [m]."""
-    bends, angle, away = table.bends, work.angle, work.away
+def _away(k: int, x: Array, u: Array, table: NodeTable, work: NodeScratch) -> tuple[float, float]:
+    # pragma: no cover - compiled
+    """What the rows that were found see of supports at x (p,) and a structure at u (size,) into work.away, what normal
+    and tangents there have of them into work.turn; s·(α + θ) [m], and √(1 − α²)."""
+    bends, angle, away, way = table.bends, work.angle, work.away, work.way
     i, t = bends.node[k], angle.shape[0]
-    for j in range(t + 1):
+    for j in range(away.shape[0]):
         away[j] = 0.0
         for e in range(table.ptr[i], table.ptr[i + 1]):
             away[j] += bends.row[e, j] * u[table.indices[table.col[e]]]
         for p in range(x.shape[0]):
             away[j] += bends.lift[i, j, p] * x[p]
-    bend = size = 0.0
     for j in range(t):
-        angle[j] = 0.0
+        way[j] = away[j + 1] - bends.place[k, j]
+    bend = size = square = 0.0
+    for j in range(t):
+        tilt = away[t + 1 + j] - bends.tilted[k, j] if away.shape[0] > t + 1 else 0.0
+        angle[j] = tilt
         for o in range(t):
-            angle[j] += bends.rate[k, j, o] * (away[o + 1] - bends.place[k, o])
-        bend += angle[j] * (away[j + 1] - bends.place[k, j])
+            angle[j] += bends.rate[k, j, o] * way[o]
+        bend += (tilt + angle[j]) * way[j]
         size += angle[j] * angle[j]
+        square += tilt * tilt
     if size > FARTHEST * FARTHEST:
         for j in range(t):
             angle[j] *= FARTHEST / math.sqrt(size)
-    _turn(angle, work.turn)
-    return bend
+    _turn(angle, way, work.turn)
+    return bend, math.sqrt(max(1.0 - square, 1.0 - FARTHEST * FARTHEST))
 
 
 @njit(cache=True, allocates=False)
@@ -146,7 +155,7 @@ def mark_bends(x: Array, u: Array, table: NodeTable, work: NodeScratch) -> None:
     for k in range(bends.node.shape[0]):
         _away(k, x, u, table, work)
         for j in range(work.turn.shape[0]):
-            for o in range(work.turn.shape[0]):
+            for o in range(work.turn.shape[1]):
                 bends.turn[k, j, o] = work.turn[j, o]
 
 
@@ -155,13 +164,13 @@ def follow_bends(x: Array, u: Array, table: NodeTable, work: NodeScratch) -> Non
     """Rows and gaps of the nodes whose normals turn at the end of a step, of supports at x (p,) and a structure at u
     (size,), into the table, and what forces along the normals at its beginning push."""
     bends, turn, away = table.bends, work.turn, work.away
-    d = turn.shape[0]
+    d, w = turn.shape
     for k in range(bends.node.shape[0]):
         i, before = bends.node[k], bends.turn[k]
-        bend = _away(k, x, u, table, work)
+        bend, tilted = _away(k, x, u, table, work)
         # The turned row sees the whole displacement: what it had before the rows were found is taken out again.
-        table.gap[i] = bent_gap(turn[0, 0], bend, bends.gap[i] + away[0])
-        for j in range(d):
+        table.gap[i] = bent_gap(turn[0, 0], tilted, bend, bends.gap[i] + away[0])
+        for j in range(w):
             table.gap[i] -= turn[0, j] * away[j]
         _turn_rows(i, turn, table)
         for e in range(table.push_ptr[i], table.push_ptr[i + 1]):
@@ -169,7 +178,7 @@ def follow_bends(x: Array, u: Array, table: NodeTable, work: NodeScratch) -> Non
         _turn_block(bends.block[i], turn, before, table.block[i])
         if table.act.shape[0]:
             for j in range(d):
-                for o in range(d):
+                for o in range(table.act_at[i + 1] - table.act_at[i]):
                     table.act[table.act_at[i] + o, j] = before[j, o]
 
 
@@ -190,18 +199,18 @@ def _turn_rows(i: int, turn: Array, table: NodeTable) -> None:  # pragma: no cov
     for p in range(table.lift.shape[2]):
         for j in range(turn.shape[0]):
             table.lift[i, j, p] = 0.0
-            for o in range(turn.shape[0]):
+            for o in range(turn.shape[1]):
                 table.lift[i, j, p] += turn[j, o] * bends.lift[i, o, p]
 
 
 @njit(cache=True, allocates=False)
 def _turn_block(base: Array, turn: Array, before: Array, out: Array) -> None:  # pragma: no cover - compiled
-    """R B Sᵀ (d, d): what forces along normal and tangents turned by S bring about along those turned by R."""
-    d = turn.shape[0]
+    """P B Qᵀ (d, d): what forces along normal and tangents turned by Q (d, w) bring about along those turned by P."""
+    d, w = turn.shape
     for j in range(d):
         for o in range(d):
             total = 0.0
-            for a in range(d):
-                for b in range(d):
+            for a in range(w):
+                for b in range(w):
                     total += turn[j, a] * base[a, b] * before[o, b]
             out[j, o] = total

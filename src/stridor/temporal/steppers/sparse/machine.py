@@ -265,6 +265,7 @@ def _forcing(system: System, layout: Layout) -> Forcing:
 
 def _scratch(table: NodeTable) -> NodeScratch:
     count, nodes, t = len(table.indices), len(table.gap), table.along.shape[1]
+    w = table.bends.row.shape[1]
     return NodeScratch(
         u=np.zeros(count),
         q=np.zeros(count),
@@ -280,8 +281,9 @@ def _scratch(table: NodeTable) -> NodeScratch:
         normal=np.zeros(ROWS),
         tangent=np.zeros(ROWS),
         angle=np.zeros(t),
-        turn=np.zeros((t + 1, t + 1)),
-        away=np.zeros(t + 1),
+        way=np.zeros(t),
+        turn=np.zeros((t + 1, w)),
+        away=np.zeros(w),
     )
 
 

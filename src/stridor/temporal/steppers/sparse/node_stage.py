@@ -49,8 +49,8 @@ class NodeScratch(NamedTuple):
     """Work space: u, q (l,) at t_{n+1}, correction (l,) of u by forces; gap (m,), slip (m, d−1) [m] free of forces;
     earlier (m,) [m]: gap at t_{n−1} of compliant nodes, zero of rigid ones;
     chosen (m,): nodes that take part, marked (m,); speed (m, d−1) [m/s] of slip at t_n; force (2, d) of one node;
-    foot, normal and tangent (10,) weights of the rows of one point that slides finitely; angle (d−1,), turn (d, d) and
-    away (d,) [m] of one node whose normal turns."""
+    foot, normal and tangent (10,) weights of the rows of one point that slides finitely; angle, way (d−1,), turn (d, w)
+    and away (w,) [m] of one node whose normal turns (`bends`)."""
 
     u: Array
     q: Array
@@ -66,6 +66,7 @@ class NodeScratch(NamedTuple):
     normal: Array
     tangent: Array
     angle: Array
+    way: Array
     turn: Array
     away: Array
 

@@ -89,47 +89,53 @@ def node_table(
     """Pack nodes. factors (p,) are those of the motions at full velocity; whole: forces move more than contacts touch;
     contacts: the point contacts, the first of the nodes, and segments (c,) that those which slide finitely are in;
     turning: how the normals of the others turn as they slide."""
+    turning = Turning.none(nodes) if turning is None else turning
     m, t = nodes.count, nodes.directions
-    d = t + 1
+    d, tilting = t + 1, turning.tilting
+    w = d + t if tilting.any() else d
     finite = [k for k, contact in enumerate(contacts) if contact.sliding == "finite"]
     on_curves: BoolArray = np.isin(np.arange(m), finite)
-    fixed = _fixed_rows(nodes, layout, on_curves)
+    fixed = _fixed_rows(nodes, layout, on_curves, turning)
     base = _base_rows(contacts, layout, finite, segments)
     fixed_answers, base_answers = (_without_zeros(answers(each.matrix)) for each in (fixed, base))
     touched = [sp.coo_array(each).col for each in (fixed.matrix, base.matrix)]
     index = np.unique(np.concatenate(touched)).astype(np.int64)
-    ptr, col, row = _by_node(m, d, index, (fixed.matrix, base.matrix), fixed, base)
-    push_ptr, push_col, push = _by_node(m, d, index, (fixed_answers, base_answers), fixed, base)
-    block = np.zeros((m, d, d))
-    still = np.flatnonzero(~on_curves)
-    for j in range(d):
-        for k in range(d):
-            together = fixed.matrix[fixed.place == j].multiply(fixed_answers[fixed.place == k])
-            block[still, j, k] = np.asarray(together.sum(axis=1)).ravel()
+    ptr, col, row = _by_node(m, w, index, (fixed.matrix, base.matrix), fixed, base)
+    push_ptr, push_col, push = _by_node(m, w, index, (fixed_answers, base_answers), fixed, base)
+    block = np.zeros((m, w, w))
+    for j in range(w):
+        for k in range(w):
+            # Of nodes that have both: rows of a tilt belong to some only.
+            one, other = (np.flatnonzero(fixed.place == each) for each in (j, k))
+            both = np.intersect1d(fixed.node[one], fixed.node[other])
+            one, other = one[np.isin(fixed.node[one], both)], other[np.isin(fixed.node[other], both)]
+            together = fixed.matrix[one].multiply(fixed_answers[other])
+            block[both, j, k] = np.asarray(together.sum(axis=1)).ravel()
     p = nodes.normal_lift.shape[1]
-    lift = np.zeros((m, d, p))
+    lift = np.zeros((m, w, p))
     lift[:, 0] = nodes.normal_lift
-    lift[:, 1:] = nodes.tangent_lift.reshape(m, t, p)
+    lift[:, 1:d] = nodes.tangent_lift.reshape(m, t, p)
+    lift[:, d:] = turning.tilt_lift.reshape(m, t, p)[:, : w - d]
     act, dense, acting = np.zeros((0, d)), np.zeros((0, layout.size)), np.zeros(m)
     if whole:
         order = np.argsort(np.concatenate([fixed.node, base.node]), kind="stable")
-        act = np.concatenate([np.eye(d)[fixed.place], np.zeros((len(base.node), d))])[order]
+        act = np.concatenate([np.eye(w, d)[fixed.place], np.zeros((len(base.node), d))])[order]
         dense = sp.csr_array(sp.vstack([fixed_answers, base_answers])).toarray()[order]
-        acting = np.where(on_curves, ROWS, d)
+        acting = np.where(on_curves, ROWS, np.where(tilting, w, d))
     gap = np.array(nodes.gap, dtype=float)
     return NodeTable(
         indices=index,
         ptr=ptr,
         col=col,
-        row=row,
+        row=row[:, :d].copy(),
         push_ptr=push_ptr,
         push_col=push_col,
-        push=push,
-        lift=lift,
+        push=push[:, :d].copy(),
+        lift=lift[:, :d].copy(),
         gap=gap,
         compliance=np.array(nodes.compliance, dtype=float),
         cubic=np.array(nodes.cubic, dtype=float),
-        block=block,
+        block=block[:, :d, :d].copy(),
         act_at=np.concatenate([[0], np.cumsum(acting)]).astype(np.int64),
         act=act,
         answers=dense,
@@ -141,18 +147,22 @@ def node_table(
         curves=_curves(
             contacts, finite, segments, base.matrix[:, index].toarray(), base_answers[:, index].toarray(), p
         ),
-        bends=bends_of(Turning.none(nodes) if turning is None else turning, row, push, lift, gap, block),
+        bends=bends_of(turning, row, push, lift, gap, block),
     )
 
 
-def _fixed_rows(nodes: ContactNodes, layout: Layout, turning: BoolArray) -> _Rows:
-    """Normal and tangents of the nodes whose rows stay, direction by direction."""
-    still, t = np.flatnonzero(~turning), nodes.directions
-    normal, tangent = layout.rows(nodes.normal), layout.rows(nodes.tangent)
-    parts = [normal[still], *(tangent[still * t + k] for k in range(t))]
+def _fixed_rows(nodes: ContactNodes, layout: Layout, on_curves: BoolArray, turning: Turning) -> _Rows:
+    """Normal and tangents of the nodes that are on no curve, and of those whose master can tilt the rows of its tilt,
+    direction by direction."""
+    still, t = np.flatnonzero(~on_curves), nodes.directions
+    tilting = np.flatnonzero(turning.tilting)
+    normal, tangent, tilt = (layout.rows(each) for each in (nodes.normal, nodes.tangent, turning.tilt))
+    parts = [normal[still], *(tangent[still * t + k] for k in range(t)), *(tilt[tilting * t + k] for k in range(t))]
     return _Rows(
-        _without_zeros(sp.vstack(parts)), np.tile(still, t + 1), np.repeat(np.arange(t + 1), len(still))
-    )  # fmt: skip
+        _without_zeros(sp.vstack(parts)),
+        np.concatenate([np.tile(still, t + 1), np.tile(tilting, t)]),
+        np.concatenate([np.repeat(np.arange(t + 1), len(still)), np.repeat(np.arange(t + 1, 2 * t + 1), len(tilting))]),
+    )
 
 
 def _base_rows(contacts: Sequence[Contact], layout: Layout, finite: Sequence[int], segments: IntArray | None) -> _Rows:

@@ -1,8 +1,8 @@
 """Finite sliding of surfaces: rows and gaps found again as the bodies move over each other.
 
 They are renewed before any node has slid a thousandth of the distance between nodes, and between renewals follow the
-master's curvature (`bends`). Where a node in contact is found at another gap than the loop left it at, the difference
-becomes an offset that fades as it slides on: no kick enters the motion.
+master's curvature and its own turning (`bends`). Where a node in contact is found at another gap than the loop left it
+at, the difference becomes an offset that fades as it slides on: no kick enters the motion.
 """
 
 from __future__ import annotations
@@ -10,16 +10,18 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
+from ....contact.coupling import point_weights
 from ....contact.curve import Curve
 from ....contact.facets import FacetSurface
 from ....contact.nodes import ContactNodes, stack
 from ....contact.obstacles import Cylinder
 from ....contact.pairing import repair
-from ....contact.surfaces import SurfaceContact
+from ....contact.surfaces import SurfaceContact, rows_along
 from ....system import System
-from ....typing import Array, IntArray
+from ....typing import Array, IntArray, Sparse
 from .bends import TURN, Turning
 from .machine import OFFSET_STEPS, Machine
 
@@ -27,6 +29,7 @@ SLIDE = 1e-3  # of the distance between nodes
 MOST_STEPS = 200
 PROBE = 1e-4  # of that distance: behind which the master's normal is looked at again
 KINK = 1e-2  # rad over it: an edge, not a curve
+NO_TILT = 1e-9  # of the sum of magnitudes: what rounding leaves of the tilt of a master that moves as a whole
 FADES_OVER = 2.0  # distances between nodes of the master
 
 
@@ -62,26 +65,58 @@ def _displaced(machine: Machine, surface: SurfaceContact) -> tuple[Array, Array]
 
 
 def turning(machine: Machine, surfaces: tuple[SurfaceContact, ...], nodes: ContactNodes, distances: Array) -> Turning:
-    """How the normals of nodes just found turn as these slide on: by the master's normals a little further on along
-    each tangent. Nodes of bodies whose material slides through their mesh stay where they are; so do their normals."""
+    """How the normals of nodes just found turn as these slide on, and as the master turns: by its normals, and by its
+    displacements, a little further on along each tangent. Nodes of bodies whose material slides through their mesh stay
+    where they are; so do their normals."""
     found = Turning.none(nodes)
-    place = nodes.tangent @ machine.displacement + nodes.tangent_lift @ machine.state.motion[0]
-    found.place[:] = place.reshape(found.place.shape)
+    u, x = machine.displacement, machine.state.motion[0]
+    found.place[:] = (nodes.tangent @ u + nodes.tangent_lift @ x).reshape(found.place.shape)
     first = len(machine.system.contacts)
+    free = [sp.csr_array((nodes.directions * first, found.tilt.shape[1]))]
     for k, surface in enumerate(surfaces):
         own = slice(first, first + surface.nodes.count)
         first = own.stop
-        if surface.sliding == "small" or surface.joined is not None or np.any(surface.drift):
-            continue
-        slave, master = _displaced(machine, surface)
-        tangents, normals, probe = nodes.tangents[own], nodes.normals[own], PROBE * distances[k]
-        for j in range(nodes.directions):
-            there = surface.slave_position + slave + probe * tangents[:, j]
-            change = surface.master.locate(there, master, guess=surface.location.facet).normal - normals
-            along = np.einsum("mkd,md->mk", tangents, change)
-            curved = np.linalg.norm(along, axis=1, keepdims=True) <= KINK
-            found.rate[own, :, j] = np.where(curved, along / probe, 0.0)
+        tilt = sp.csr_array((nodes.directions * surface.nodes.count, found.tilt.shape[1]))
+        if surface.sliding == "finite" and not np.any(surface.drift):
+            found.rate[own], tilt, found.tilt_lift.reshape(*found.place.shape, -1)[own] = _turning_of(
+                surface, *_displaced(machine, surface), nodes.tangents[own], PROBE * distances[k]
+            )
+        free.append(tilt)
+    found = replace(found, tilt=sp.csr_array(sp.vstack(free)))
+    found.tilted[:] = found.tilts(u, x)
     return found
+
+
+def _turning_of(
+    surface: SurfaceContact, slave: Array, master: Array, tangents: Array, probe: float
+) -> tuple[Array, Sparse, Array]:
+    """Of the m nodes of a surface just found with tangents (m, d−1, d): rate (m, d−1, d−1), tilt (m (d−1), n) and its
+    lift (m, d−1, p) of `Turning`, by its master a ``probe`` [m] further on along each tangent."""
+    joined, here = surface.joined, surface.location
+    apart = tangents if joined is None else joined.tangents(tangents[joined.into])
+    m, t = tangents.shape[:2]
+    rate, lift = np.zeros((m, t, t)), np.zeros((m, t, surface.slave.lift.shape[1]))
+    rows: list[Sparse] = []
+    weights = point_weights(here, surface.master.node_count)
+    for j in range(t):
+        place = surface.slave_position + slave + probe * apart[:, j]
+        there = surface.master.locate(place, master, guess=here.facet)
+        tilt = rows_along(sp.csr_array(weights - point_weights(there, surface.master.node_count)) / probe, here.normal)
+        if joined is not None:
+            there, tilt = joined.even(there, surface.area), joined.mean(surface.area) @ tilt
+        along = np.einsum("mkd,md->mk", apart, there.normal - here.normal)[surface.first]
+        curved = np.linalg.norm(along, axis=1, keepdims=True) <= KINK
+        rate[:, :, j] = np.where(curved, along / probe, 0.0)
+        moved, sizes = surface.master_rows, abs(tilt)
+        free, most = sp.csr_array(tilt @ moved.free), sizes @ abs(moved.free)
+        rows.append(sp.csr_array(free.multiply(abs(free) > NO_TILT * most)))
+        carried = tilt @ moved.lift
+        lift[:, j] = np.where(np.abs(carried) > NO_TILT * (sizes @ np.abs(moved.lift)), carried, 0.0)
+    # Node by node, as tangents are.
+    order = np.arange(t * m).reshape(t, m).T.ravel()
+    free = sp.csr_array(sp.vstack(rows))[order]
+    free.eliminate_zeros()
+    return rate, free, lift
 
 
 def _joined(machine: Machine, points: ContactNodes, surfaces: list[SurfaceContact]) -> ContactNodes:
@@ -187,7 +222,8 @@ def steps_to_renewal(machine: Machine, distances: Array, last: int) -> int:
     at most twice as many as the ``last`` time, for what starts from rest does not stay at its speed."""
     nodes, slip = machine.nodes, _slip(machine)
     speed = np.linalg.norm(slip, axis=1)
-    turned = np.linalg.norm(np.einsum("mjk,mk->mj", machine.turning.rate, slip), axis=1)
+    tilts = machine.turning.tilts(machine.fields.q[machine.layout.index], machine.state.motion[1])
+    turned = np.linalg.norm(np.einsum("mjk,mk->mj", machine.turning.rate, slip) + tilts, axis=1)
     points = len(machine.system.contacts)
     steps = min(2 * last, MOST_STEPS)
     for k, surface in enumerate(machine.system.surfaces):

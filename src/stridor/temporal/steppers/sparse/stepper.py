@@ -184,7 +184,10 @@ class SparseStepper:
             machine.state.motion[0] = restart.state["renewed_at"][size:]
             start = np.asarray(restart.state["renewed_from"], dtype=np.int64)
             surfaces, nodes, _ = renew(machine, put_on(machine.surfaces, start))
-            take_over(machine, surfaces, nodes, Turning.none(nodes))
+            # Before the first renewal none turns.
+            found = int(restart.state["renewal"][0]) > 0
+            turns = turning(machine, surfaces, nodes, self.distances) if found else Turning.none(nodes)
+            take_over(machine, surfaces, nodes, turns)
         for name, held in self._moving().items():
             held[:] = restart.state[name]
         if self.finite:

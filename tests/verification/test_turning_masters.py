@@ -1,0 +1,214 @@
+"""Masters that turn themselves under what slides on them, in time: against equations of motion of their own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.integrate
+import scipy.sparse as sp
+
+from marching import one_phase, simulate_assembled
+from stridor.contact.curve import Curve
+from stridor.contact.facets import FacetSurface
+from stridor.contact.interface import Rows
+from stridor.contact.joined import Joined
+from stridor.contact.pairing import pair_surface
+from stridor.laws import Coulomb
+from stridor.system import System
+from stridor.system.model import PrescribedMotion
+from stridor.temporal.settings import Settings
+from stridor.temporal.simulate import simulate
+
+pytestmark = pytest.mark.verification
+
+GRAVITY = 9.81
+MASS, INERTIA, STIFFNESS = 1.0, 0.05, 200.0
+START = np.array([0.05, -0.03])  # m, of the bead on the plate
+SPEED = np.array([1.0, 0.4])
+TILT = np.array([0.5, -0.3])  # rad/s
+
+
+def plate(dimension):
+    """Nodes (k, d) of a flat 1 m wide, and the surface that they make."""
+    x = np.linspace(0.5, -0.5, 11)
+    if dimension == 2:
+        positions = np.column_stack([x, 0 * x])
+        lines = np.column_stack([np.arange(10), np.arange(1, 11)])
+        return positions, Curve.from_facets(positions, {"line": lines}, where="plate")
+    grid = np.arange(121).reshape(11, 11)
+    positions = np.array([[a, b, 0.0] for a in x for b in x])
+    quads = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1).reshape(-1, 4)
+    return positions, FacetSurface.from_facets(positions, {"quad": quads}, where="plate")
+
+
+def rocking(dimension, *, friction=0.0, damping=None, area=0.1, sliding=1.0, swing=1.0, apart=0.0) -> System:
+    """A bead, its d coordinates, on a plate that turns on a pivot by d − 1 angles, held by springs. apart [m]: it has two
+    feet so far apart which are one node of the contact."""
+    d, size = dimension, 2 * dimension - 1
+    positions, master = plate(d)
+    on_plate = sp.lil_array((d * len(positions), size))
+    for j in range(d - 1):
+        on_plate[d - 1 :: d, d + j] = positions[:, [j]]
+    bead = Rows(sp.csr_array(sp.eye_array(d, size)), np.zeros((d, 0)))
+    tilts = Rows(sp.csr_array(sp.eye_array(size))[d : 2 * d], np.zeros((d - 1, 0)))
+    tilts = Rows(sp.csr_array(sp.vstack([tilts.free, sp.csr_array((1, size))])), np.zeros((d, 0)))
+    start = np.append(START[: d - 1], 0.0)
+    contact = pair_surface(
+        "plate", where="contacts.plate", slave=bead, slave_position=start[None], slave_normals=np.zeros((1, d)),
+        area=np.full(1, area), master=master, master_rows=Rows(sp.csr_array(on_plate), np.zeros((d * len(positions), 0))),
+        drift=np.zeros((1, d, 0)), stiffness_per_area=np.inf, law=Coulomb(friction), sliding="finite", adjust=True,
+    )  # fmt: skip
+    if apart:
+        contact = on_two_feet(contact, apart)
+    mass = np.diag([*[MASS] * d, *[INERTIA] * (d - 1)])
+    held = np.diag([*[0.0] * d, *[STIFFNESS] * (d - 1)])
+    weight = np.zeros(size)
+    weight[d - 1] = -MASS * GRAVITY
+    speed, tilt = sliding * SPEED[: d - 1], swing * TILT[: d - 1]
+    return System(
+        mass, np.zeros((size, size)) if damping is None else damping, held, (), {"weight": weight},
+        surfaces=(contact,), points={"bead": bead, "tilt": tilts}, dimension=d,
+        initial_velocity=np.concatenate([speed, [tilt @ START[: d - 1]], tilt]),
+    )  # fmt: skip
+
+
+def on_two_feet(contact, apart):
+    """The contact of a point with that of two beside it in its place, as parts of one node."""
+    d = contact.slave_position.shape[1]
+    slave = Rows(sp.csr_array(sp.vstack([contact.slave.free] * 2)), np.zeros((2 * d, 0)))
+    two = pair_surface(
+        "plate", where="contacts.plate", slave=slave, slave_normals=np.zeros((2, d)), area=0.5 * contact.area.repeat(2),
+        slave_position=contact.slave_position + 0.5 * apart * np.outer([-1.0, 1.0], np.eye(d)[0]),
+        master=contact.master, master_rows=contact.master_rows, drift=np.zeros((2, d, 0)), stiffness_per_area=np.inf,
+        law=contact.law, sliding="finite", adjust=True,
+    )  # fmt: skip
+    one = Joined(np.zeros(2, dtype=np.int64), np.stack([np.eye(d)] * 2), np.zeros(0, dtype=np.int64))
+    return replace(two, joined=one, nodes=one.nodes(two.nodes))
+
+
+def truth(system, duration):
+    """Coordinates and velocities over time, and the normal force at such states: M q̈ + C q̇ + K q = f + GᵀL with
+    Φ = z − Σ α_j x_j = 0, so that G q̈ = 2 Σ α̇_j ẋ_j."""
+    d, size = system.dimension, system.size
+    weight = system.loads["weight"]
+    mass, damping, stiffness = (np.asarray(part.todense()) for part in (system.mass, system.damping, system.stiffness))
+
+    def solved(y):
+        q, v = y[:size], y[size:]
+        row = np.concatenate([-q[d:], [1.0], -q[: d - 1]])
+        whole = np.block([[mass, -row[:, None]], [row[None], np.zeros((1, 1))]])
+        place = np.append(q[: d - 1] - START[: d - 1], np.zeros(size - d + 1))
+        springs = stiffness @ np.concatenate([place[: d - 1], q[d - 1 :]])
+        return np.linalg.solve(whole, np.append(weight - damping @ v - springs, 2.0 * v[d:] @ v[: d - 1]))
+
+    begin = np.concatenate([START[: d - 1], np.zeros(d), system.initial_velocity])
+    way = scipy.integrate.solve_ivp(
+        lambda _, y: np.concatenate([y[size:], solved(y)[:size]]), (0, duration), begin,
+        rtol=1e-11, atol=1e-12, dense_output=True,
+    ).sol  # fmt: skip
+    return way, lambda y: solved(y)[size] * np.sqrt(1.0 + y[d:size] @ y[d:size])
+
+
+def off(system, duration, step, path="assembled"):
+    """The largest error of the normal force after the first millisecond, as a part of its mean, and that of the tilt
+    at the end [rad]."""
+    found = simulate(
+        system, one_phase(duration), Settings(step=step, record_every=1, watch=("bead", "tilt"), path=path)
+    )
+    way, force = truth(system, duration)
+    true = np.array([force(way(t)) for t in found.time])
+    settled, d = found.time > 1e-3, system.dimension
+    tilt = found.displacement[-1, 1, : d - 1] - way(found.time[-1])[d : 2 * d - 1]
+    return np.abs(found.normal_force[settled, 0] - true[settled]).max() / true.mean(), np.abs(tilt).max()
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_bead_on_a_rocking_plate_shows_no_blows(dimension):
+    """Normals that turned with the plate at renewals only had the Coriolis force as one blow each time, of the size of
+    the force at 1e-5 s, four times that at 2.5e-6 s."""
+    system = rocking(dimension)
+    errors, tilts = zip(*(off(system, 0.02, step) for step in (4e-5, 1e-5, 2.5e-6)), strict=True)
+    assert max(errors) < 1e-6
+    assert max(tilts[1] / tilts[0], tilts[2] / tilts[1]) < 0.08  # of second order
+    assert tilts[1] < 1e-9
+
+
+def test_a_bead_on_a_rocking_plate_whose_damping_couples_all():
+    """The same where every step is solved with a matrix."""
+    root = np.array([[0.5, 0.1, 0.02], [0.0, 0.4, 0.03], [0.0, 0.0, 0.05]])
+    system = rocking(2, damping=root.T @ root)
+    errors = [off(system, 0.02, step, path="nodal")[0] for step in (4e-5, 1e-5)]
+    assert errors[0] < 3e-6
+    assert errors[1] < 0.4 * errors[0]
+
+
+def test_a_bead_on_a_plate_that_a_support_turns():
+    """At a steady rate Ω: the plate is at y = Ω t x, and m ẍ = −Ω t L, m (Ω t ẍ + 2 Ω ẋ) = L − m g."""
+    rate, none = 0.8, np.zeros((2, 1))
+    positions, master = plate(2)
+    lift = np.zeros((2 * len(positions), 1))
+    lift[1::2, 0] = positions[:, 0]
+    bead = Rows(sp.csr_array(sp.eye_array(2)), none)
+    contact = pair_surface(
+        "plate", where="contacts.plate", slave=bead, slave_position=np.array([[START[0], 0.0]]),
+        slave_normals=np.zeros((1, 2)), area=np.full(1, 0.1), master=master,
+        master_rows=Rows(sp.csr_array((len(lift), 2)), lift), drift=np.zeros((1, 2, 1)), stiffness_per_area=np.inf,
+        law=Coulomb(0.0), sliding="finite", adjust=True,
+    )  # fmt: skip
+    one = np.zeros((1, 1))
+    system = System(
+        MASS * np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), (), {"weight": np.array([0.0, -MASS * GRAVITY])},
+        surfaces=(contact,), points={"bead": bead}, dimension=2,
+        motion=PrescribedMotion(("turn",), none, none, none, one, one, one),
+        initial_velocity=np.array([SPEED[0], rate * START[0]]),
+    )  # fmt: skip
+
+    def solved(t, y):
+        slope = rate * t
+        force = (GRAVITY + 2.0 * rate * y[1]) * MASS / (1.0 + slope**2)
+        return -slope * force / MASS, force * np.sqrt(1.0 + slope**2)
+
+    way = scipy.integrate.solve_ivp(
+        lambda t, y: [y[1], solved(t, y)[0]], (0, 0.02), [START[0], SPEED[0]], rtol=1e-11, atol=1e-12, dense_output=True
+    ).sol
+    for step in (4e-5, 1e-5):
+        settings = Settings(step=step, record_every=1, watch=("bead",))
+        found = simulate_assembled(system, one_phase(0.02, velocities={"turn": rate}), settings)
+        true = np.array([solved(t, way(t))[1] for t in found.time])
+        settled = found.time > 1e-3
+        np.testing.assert_allclose(found.normal_force[settled, 0], true[settled], rtol=5e-6)
+
+
+def test_a_node_of_two_parts_turns_with_the_plate_as_one():
+    """As where a body repeats: the mean of both has its lever half way between them."""
+    assert off(rocking(3, apart=0.04), 0.02, 1e-5)[0] < 1e-6
+
+
+def test_what_sticks_to_a_rocking_plate_is_held_along_its_normal():
+    """Nothing slides, so that rows are renewed for the turning alone: the force of the rider is that of its weight and
+    inertia, along the normal and tangent of the plate as it is then."""
+    system = rocking(2, friction=0.9, sliding=0.0, swing=4.0)
+    found = simulate_assembled(system, one_phase(0.1), Settings(step=2e-5, record_every=1, watch=("bead", "tilt")))
+    total = INERTIA + MASS * START[0] ** 2
+    rate = np.sqrt(STIFFNESS / total)
+    lag = GRAVITY * MASS * START[0] / STIFFNESS  # the tilt that the weight stands for
+    angle = lag * (np.cos(rate * found.time) - 1.0) + system.initial_velocity[2] / rate * np.sin(rate * found.time)
+    upward = MASS * (GRAVITY - rate**2 * START[0] * (angle + lag))
+    settled, slope = found.time > 1e-3, np.arctan(angle)
+    assert np.ptp(slope) > 0.04
+    np.testing.assert_allclose(found.displacement[:, 1, 0], angle, rtol=0.0, atol=1e-7)
+    np.testing.assert_allclose(found.normal_force[settled, 0], (upward * np.cos(slope))[settled], rtol=0.0, atol=3e-4)
+    np.testing.assert_allclose(found.tangential_force[settled, 0], (upward * np.sin(slope))[settled], rtol=0.0, atol=3e-4)
+
+
+@pytest.mark.parametrize("part", [0.0101, 0.0153])
+def test_a_restart_between_two_renewals_turns_on_as_before(part):
+    """To the bit."""
+    system, settings = rocking(3, friction=0.1), Settings(step=1e-5, record_every=1, watch=("bead",))
+    whole = simulate_assembled(system, one_phase(0.02), settings)
+    first = simulate_assembled(system, one_phase(part), settings)
+    again = simulate_assembled(system, one_phase(0.02), settings, restart=first)
+    assert np.array_equal(again.normal_force, whole.normal_force)
+    assert np.array_equal(again.displacement, whole.displacement)
