@@ -222,3 +222,55 @@ def test_what_is_said_of_a_sector_is_said_of_motions_alike_in_all_sectors_alone(
     assert any(said.startswith("ties.one: bodies repeat") for said in sector.warnings)
     for said in (every.completeness[0], of_modes(every, "0.4").sentence, *whole.warnings):
         assert "alike" not in said
+
+
+DOUBLE = """
+units = "SI"
+[materials.a]
+young_modulus = 2e11
+density = 7800.0
+poisson_ratio = 0.3
+[bodies.one]
+type = "solid"
+material = "a"
+model = "plane stress"
+thickness = 0.01
+mass = "lumped"
+mesh = { shape = "annulus", inner_radius = 0.07, outer_radius = 0.1, divisions = [1, 6], start_deg = 0.0, sweep_deg = 180.0, cells = "quad" }
+[supports.one]
+at = "one.inner"
+fixed = ["x", "y"]
+[ties.one]
+slave = "one.end"
+master = "one.start"
+rotation = { angle_deg = 180.0 }
+[bodies.wall]
+type = "obstacle"
+shape = "cylinder"
+point = [0.0, 0.0]
+radius = 0.1
+inside = true
+sliding = { spin = 10.0 }
+[contacts.c]
+slave = "one.outer"
+master = "wall"
+stiffness = "rigid"
+interference = 5e-4
+friction = { law = "coulomb", coefficient = 0.35 }
+[modal]
+max_frequency_hz = 150000.0
+"""
+
+
+def test_of_modes_that_are_one_without_friction_the_way_on_is_told():
+    """Two modes of one frequency that friction parts from μ = 0 on: no smaller range from 0 on tells more."""
+    case = loads(DOUBLE)
+    modes = st.modes(case, 1e-3, max_frequency_hz=150e3)
+    assert np.count_nonzero(modes.unstable[0]) == 2
+    found = st.onsets(case, (0.0, 0.8))
+    assert not found.complete
+    assert "Two modes each are one at μ = 0 (22158.1 Hz, 26943.5 Hz)" in found.completeness
+    assert "(--range 0.0008:0.8)" in found.completeness
+    beyond = st.onsets(case, (8e-4, 0.8))
+    assert beyond.complete
+    assert sorted(v.imag / (2 * np.pi) for v in beyond.at_start) == pytest.approx([22158.06, 26943.53], rel=1e-5)

@@ -23,6 +23,7 @@ from .options import Options
 from .results import grows
 
 MOST = 4  # that are named
+DOUBLE = 1e-8  # of λ: modes no further from one another are one
 
 
 def checked_onsets(
@@ -147,7 +148,7 @@ def _sentence(found: Onsets, start: Growing, end: Growing, between: Between) -> 
         )
     wrong += _roots_amiss(found, start, end)
     if wrong:
-        return f"{NOT_COMPLETE}: {numbers}, but {'; '.join(wrong)}. Take a smaller range of μ."
+        return f"{NOT_COMPLETE}: {numbers}, but {'; '.join(wrong)}. {_advice(start, high)}"
     if not (start.complete and end.complete):
         sentence = start.sentence if not start.complete else end.sentence
         return f"{NOT_COMPLETE}: {numbers}, as the onsets say, but {sentence}"
@@ -155,6 +156,20 @@ def _sentence(found: Onsets, start: Growing, end: Growing, between: Between) -> 
         f"{CHECKED} {'both ends' if start.sought else 'the high end'}: {numbers}, and each of them goes back to an "
         f"onset listed or grew from the start.{_left_words(found, start, end)}{_parted_words(found, start, end)} "
         f"{end.sentence} What grows and ends again between them rests on the branches followed.{between.words}"
+    )
+
+
+def _advice(start: Growing, high: float) -> str:
+    """What to do where something is not told. Friction may part two modes of one frequency from its first value on."""
+    values = start.beside[(start.beside.imag > 0) & (np.abs(start.beside) <= start.top)]
+    values = values[np.argsort(values.imag)]
+    doubles = values[:-1][np.abs(np.diff(values)) <= DOUBLE * np.abs(values[:-1])]
+    if start.mu > 0 or not len(doubles):
+        return "Take a smaller range of μ."
+    named = ", ".join(f"{v.imag / (2 * np.pi):.6g} Hz" for v in doubles[:MOST])
+    return (
+        f"Two modes each are one at μ = 0 ({named}), and may grow from there on: a range that begins above 0 "
+        f"(--range {1e-3 * high:.3g}:{high:g}) lists what grows already."
     )
 
 
