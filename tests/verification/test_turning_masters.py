@@ -144,12 +144,12 @@ def test_a_bead_on_a_rocking_plate_whose_damping_couples_all():
     assert errors[1] < 0.4 * errors[0]
 
 
-def test_a_bead_on_a_plate_that_a_support_turns():
-    """At a steady rate Ω: the plate is at y = Ω t x, and m ẍ = −Ω t L, m (Ω t ẍ + 2 Ω ẋ) = L − m g."""
-    rate, none = 0.8, np.zeros((2, 1))
+def turned_by_a_support(rate, unit=1.0):
+    """A bead on a plate that a support turns at a steady rate [rad/s], its motion counted in so many radians."""
+    none = np.zeros((2, 1))
     positions, master = plate(2)
     lift = np.zeros((2 * len(positions), 1))
-    lift[1::2, 0] = positions[:, 0]
+    lift[1::2, 0] = unit * positions[:, 0]
     bead = Rows(sp.csr_array(sp.eye_array(2)), none)
     contact = pair_surface(
         "plate", where="contacts.plate", slave=bead, slave_position=np.array([[START[0], 0.0]]),
@@ -157,13 +157,19 @@ def test_a_bead_on_a_plate_that_a_support_turns():
         master_rows=Rows(sp.csr_array((len(lift), 2)), lift), drift=np.zeros((1, 2, 1)), stiffness_per_area=np.inf,
         law=Coulomb(0.0), sliding="finite", adjust=True,
     )  # fmt: skip
-    one = np.zeros((1, 1))
-    system = System(
+    one = np.full((1, 1), unit)
+    return System(
         MASS * np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), (), {"weight": np.array([0.0, -MASS * GRAVITY])},
         surfaces=(contact,), points={"bead": bead}, dimension=2,
         motion=PrescribedMotion(("turn",), none, none, none, one, one, one),
         initial_velocity=np.array([SPEED[0], rate * START[0]]),
     )  # fmt: skip
+
+
+def test_a_bead_on_a_plate_that_a_support_turns():
+    """At a steady rate Ω: the plate is at y = Ω t x, and m ẍ = −Ω t L, m (Ω t ẍ + 2 Ω ẋ) = L − m g."""
+    rate = 0.8
+    system = turned_by_a_support(rate)
 
     def solved(t, y):
         slope = rate * t
@@ -179,6 +185,18 @@ def test_a_bead_on_a_plate_that_a_support_turns():
         true = np.array([solved(t, way(t))[1] for t in found.time])
         settled = found.time > 1e-3
         np.testing.assert_allclose(found.normal_force[settled, 0], true[settled], rtol=5e-6)
+
+
+def test_a_restart_counts_the_support_s_way_in_another_unit():
+    """Twice the unit at half the factor is the same motion, from the way gone so far on."""
+    rate, settings = 0.8, Settings(step=1e-5, record_every=1, watch=("bead",))
+    whole = simulate_assembled(turned_by_a_support(rate), one_phase(0.02, velocities={"turn": rate}), settings)
+    first = simulate_assembled(turned_by_a_support(rate), one_phase(0.0153, velocities={"turn": rate}), settings)
+    again = simulate_assembled(
+        turned_by_a_support(rate, 2.0), one_phase(0.02, velocities={"turn": rate / 2.0}), settings, restart=first,
+        changed=True,
+    )  # fmt: skip
+    np.testing.assert_allclose(again.normal_force, whole.normal_force, rtol=1e-9)
 
 
 def test_a_node_of_two_parts_turns_with_the_plate_as_one():

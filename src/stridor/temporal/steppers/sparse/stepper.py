@@ -176,12 +176,14 @@ class SparseStepper:
     def resume(self, restart: Trajectory, schedule: Schedule, *, changed: bool) -> None:
         """Take up a state that was checked."""
         machine, size = self.machine, self.system.size
+        # The places that the supports have reached stay, whatever a unit of their motion is now.
+        ratio = motion_ratio(self.parts, restart, self.system.motion.names) if changed else 1.0
         machine.contacts.segment[:] = restart.state["contacts_segment"]
         machine.set_nodes(machine.nodes, machine.turning)
         if self.finite:
             # Rows as they were last found: first at that displacement, then the state itself.
             machine.fields.u[machine.layout.index] = restart.state["renewed_at"][:size]
-            machine.state.motion[0] = restart.state["renewed_at"][size:]
+            machine.state.motion[0] = restart.state["renewed_at"][size:] / ratio
             start = np.asarray(restart.state["renewed_from"], dtype=np.int64)
             surfaces, nodes, _ = renew(machine, put_on(machine.surfaces, start))
             # Before the first renewal none turns.
@@ -195,8 +197,6 @@ class SparseStepper:
         machine.contacts.q[:] = machine.fields.q[machine.table.indices]
         machine.state.counters[[KEPT, NODES_KEPT]] = 0  # files of older versions have them
         if changed:
-            ratio = motion_ratio(self.parts, restart, self.system.motion.names)
-            # The places that the supports have reached stay, whatever a unit of their motion is now.
             machine.state.motion[:] /= ratio
             self.renewed_at[size:] /= ratio
             # No number: the next step finds its forces anew.
