@@ -326,6 +326,22 @@ def test_cells_that_are_open_along_an_edge(folder: Path) -> None:
     )
 
 
+def test_a_face_on_two_triangles(folder: Path) -> None:
+    """Two tetrahedra on a cube, which share all nodes of its face and leave none over."""
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    cube = np.vstack([np.column_stack([square, np.full(4, z)]) for z in (0, 1)])
+    points = np.vstack([cube, [[0.5, 0.5, 2.0]]]) * 0.01
+    numbers = [f" {k + 1}, {x:.9g}, {y:.9g}, {z:.9g}\n" for k, (x, y, z) in enumerate(points)]
+    text = "*NODE\n" + "".join(numbers) + "*ELEMENT, TYPE=C3D8, ELSET=body\n 1, 1, 2, 3, 4, 5, 6, 7, 8\n"
+    (folder / "a.inp").write_text(text + "*ELEMENT, TYPE=C3D4, ELSET=body\n 2, 5, 6, 7, 9\n 3, 5, 7, 8, 9\n")
+    case = st.loads(SPACE.replace("FILE", "a.inp"), folder=folder)
+    assert st.describe(case).warnings == (
+        "bodies.slider: 1 face of hexahedra on two triangles of tetrahedra, the first at (0.005, 0.005, 0.01): the mesh "
+        "is open between its corners, as a face bends where triangles are flat; take cells of one kind on both sides, "
+        "or tie two bodies",
+    )
+
+
 # -- groups --------------------------------------------------------------------------------------------------------------
 
 GROUPS = {

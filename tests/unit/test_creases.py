@@ -252,3 +252,36 @@ def test_a_slave_on_an_edge_looks_its_own_way_between_those_of_the_sides(own_deg
         assert abs(found.gap[0]) < 2e-9
     beside = np.array([[3.99, 0.5, 0.0]])
     assert surface.at_corners(surface.locate(beside), beside, -at(7.0)[None]).normal[0] == pytest.approx(at(0.0))
+
+
+@pytest.mark.parametrize(("own_deg", "seen_deg"), [(0.0, 0.0), (-7.0, -7.0), (12.0, 0.0), (-35.0, -20.0)])
+def test_a_slave_on_an_inward_edge_looks_its_own_way_too(own_deg, seen_deg):
+    def at(deg):
+        return np.array([np.sin(np.radians(deg)), 0.0, np.cos(np.radians(deg))])
+
+    rising = [*[(x, 0.0) for x in (0.0, 1.0, 2.0, 3.0, 4.0)], (5.0, np.tan(np.radians(20.0)))]
+    surface = extruded(rising, [0, 1, 2], "quad")
+    for x, y in ((4.0, 0.3), (4.0, 1.0), (4.0 + 1e-9, 0.5), (4.0 - 1e-9, 0.5)):
+        there = np.array([[x, y, 0.0]])
+        found = surface.at_corners(surface.locate(there), there, -at(own_deg)[None])
+        assert found.normal[0] == pytest.approx(at(seen_deg), abs=1e-9)
+        assert abs(found.gap[0]) < 2e-9
+    beside = np.array([[3.99, 0.5, 0.0]])
+    assert surface.at_corners(surface.locate(beside), beside, -at(-7.0)[None]).normal[0] == pytest.approx(at(0.0))
+    unknown = surface.at_corners(surface.locate(beside), beside, np.zeros((1, 3)))
+    assert unknown.normal == pytest.approx(surface.locate(beside).normal)
+
+
+@pytest.mark.parametrize("up", [1.0, -1.0])
+def test_where_edges_meet_a_slave_looks_its_own_way_amid_all_sides(up):
+    """At the top of a pyramid and at the ground of a pit of three sides, none of which lets the middle way out."""
+    azimuths = np.radians([0.0, 120.0, 240.0])
+    tips = np.column_stack([np.cos(azimuths), np.sin(azimuths), np.full(3, -0.6 * up)])
+    cells = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1]])
+    surface = surface_of(np.concatenate([np.zeros((1, 3)), tips]), cells, "triangle")
+    assert surface.sharp.sum() == 6
+    slave = np.zeros((1, 3))
+    for own in ([0.0, 0.0, 1.0], [0.1, 0.05, 1.0], [-0.05, 0.1, 1.0]):
+        own = np.array(own) / np.linalg.norm(own)
+        found = surface.at_corners(surface.locate(slave), slave, -own[None])
+        assert found.normal[0] == pytest.approx(own, abs=1e-12)

@@ -108,11 +108,23 @@ def test_a_slave_at_a_corner_looks_its_own_way_between_those_of_the_sides(turned
     assert curve.at_corners(curve.locate(beside), beside, -at(-7.0)[None]).normal[0] == pytest.approx(at(0.0))
 
 
-def test_into_a_notch_a_slave_has_no_choice():
+@pytest.mark.parametrize(
+    ("own_deg", "seen_deg"), [(0.0, 0.0), (7.0, 7.0), (-12.0, 0.0), (40.0, 40.0), (60.0, 45.0)]
+)
+def test_a_slave_in_a_notch_looks_its_own_way_between_those_of_the_sides(own_deg, seen_deg):
+    """Out of the sides at 0° and 45°."""
+
+    def at(deg: float):
+        return np.array([-np.sin(np.radians(deg)), -np.cos(np.radians(deg))])
+
     curve = line([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, -1.0], [4.0, -2.0]])
-    slave = np.array([[2.0, 0.0]])
-    found = curve.locate(slave)
-    assert curve.at_corners(found, slave, np.array([[0.3, 1.0]])).normal == pytest.approx(found.normal)
+    for moved in (0.0, 1e-9, -1e-9):
+        there = np.array([[2.0 + moved, 0.0]])
+        found = curve.at_corners(curve.locate(there), there, -at(own_deg)[None])
+        assert found.normal[0] == pytest.approx(at(seen_deg), abs=1e-12)
+        assert abs(found.gap[0]) < 2e-9
+    beside = np.array([[1.99, 0.0]])
+    assert curve.at_corners(curve.locate(beside), beside, -at(7.0)[None]).normal[0] == pytest.approx(at(0.0))
 
 
 def test_a_line_that_turns_once_and_a_single_node_between_two_facets():

@@ -7,8 +7,9 @@ import pytest
 
 from stridor.errors import CaseError
 from stridor.mesh import shapes
-from stridor.mesh.boundary import cell_facets, match_facets
-from stridor.mesh.hanging import hanging
+from stridor.mesh.boundary import cell_facets, facets_within, match_facets
+from stridor.mesh.facets import facet_areas
+from stridor.mesh.hanging import hanging, on_two_triangles
 from stridor.mesh.model import Mesh
 from stridor.mesh.quality import check_mesh, edge_lengths, pieces, turned_over
 
@@ -179,6 +180,40 @@ def test_midside_nodes_that_belong_to_the_cells_on_one_side_only(below: str, abo
     found = hanging(mesh)
     assert len(found) == count
     assert np.all(mesh.points[found][:, 2] == 1.0)
+
+
+@pytest.mark.parametrize(
+    ("below", "above", "count"),
+    [
+        ("hexahedron", "tetra", 2), ("tetra", "hexahedron", 2), ("hexahedron27", "tetra10", 2),
+        ("hexahedron20", "tetra10", 0), ("hexahedron", "tetra10", 0), ("hexahedron", "hexahedron", 0),
+        ("tetra", "tetra", 0), ("hexahedron", "hexahedron20", 0),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("seed", [None, 1])
+def test_faces_that_share_their_nodes_with_two_triangles(below, above, count, seed):
+    """And bend where these are flat. Nodes too few or too many are another matter."""
+    mesh = together(shapes.block(*LOW, kind=below), shapes.block(*HIGH, kind=above))
+    if seed is not None:
+        rng = np.random.default_rng(seed)
+        order = rng.permutation(len(mesh.points))
+        number = np.argsort(order)
+        mesh = Mesh(mesh.points[order], {kind: number[rng.permutation(block)] for kind, block in mesh.cells.items()})
+    check_mesh(mesh, "mesh")
+    found = on_two_triangles(mesh)
+    assert len(found) == count
+    assert np.all(found[:, 2] == 1.0)
+
+
+@pytest.mark.parametrize(("below", "above"), [("hexahedron", "tetra"), ("hexahedron27", "tetra10"), ("tetra", "tetra")])
+def test_what_lies_between_two_kinds_of_cells_is_no_surface(below, above):
+    """The surface of the whole is that of one box, 2 by 1 by 2."""
+    mesh = together(shapes.block(*LOW, kind=below), shapes.block(*HIGH, kind=above))
+    outside = facets_within(mesh.cells, mesh.points, np.arange(len(mesh.points)))
+    area = sum(float(of_kind.sum()) for of_kind in facet_areas(mesh.points, outside).values())
+    assert area == pytest.approx(16.0)
+    amid = np.flatnonzero(mesh.points[:, 2] == 1.0)
+    assert not facets_within(mesh.cells, mesh.points, amid)
 
 
 def test_linear_and_quadratic_cells_in_the_plane():

@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import scipy.sparse as sp
 
-from ..mesh.facets import facet_integrals, shape_functions
+from ..mesh.facets import facet_integrals, facet_normals, shape_functions
 from ..mesh.model import Blocks
 from ..mesh.positive_basis import MIDDLES, changed_basis
 from ..typing import Array, BoolArray, IntArray, Sparse
@@ -29,7 +29,7 @@ from .curve import Curve
 from .facets import FacetSurface
 from .interpolation import LINEAR, element_weights
 from .master import Location, MasterSurface
-from .pieces import outlines, pieces
+from .pieces import outlines, pieces, places_below
 from .rim import Hanging, Rim
 
 # Facets integrated together: their arrays fit comfortably into memory.
@@ -222,7 +222,8 @@ def _integrated(
             values, slopes = shape_functions(kind, points.local)
             at = np.einsum("qr,qrd->qd", values, corners[points.owner])
             weight = points.weight * stretch(slopes, corners[points.owner])
-            found = master.locate(at, displacement, guess=location.facet[nodes[points.owner, 0]])
+            outward = facet_normals(positions, nodes, kind)[points.owner]
+            found = places_below(master, at, outward, displacement, location.facet[nodes[points.owner, 0]])
             element, weights = element_weights(master, found, at, current)
             below = np.einsum("qr,qrd->qd", weights, current[element])
             gap = np.sum(found.normal * (at - below), axis=1)

@@ -254,10 +254,11 @@ class Curve:
         return towards[node], away[node]
 
     def at_corners(self, location: Location, slaves: Array, slave_normals: Array) -> Location:
-        """Places of undisplaced slaves (m, 2) [m] where those that lie at an outward corner look the way their own
-        normals (m, 2) say, as far as the normals of both sides of the corner enclose that.
+        """Places of undisplaced slaves (m, 2) [m] where those that lie at a corner look the way their own normals
+        (m, 2) say, as far as the normals of both sides of the corner enclose that.
 
-        Which of its sides is nearer there rounding decides. Slaves without a normal keep that side's.
+        Which of its sides is nearer there rounding decides, of an inward corner as of an outward one. Slaves without a
+        normal keep that side's.
         """
         xi = np.zeros(len(slaves)) if location.local is None else location.local[:, 0]
         at = self.stencils[location.facet, np.where(xi < 0.5, 1, 2)]
@@ -270,11 +271,10 @@ class Curve:
         out = np.stack([chord[:, 1], -chord[:, 0]], axis=1) / np.linalg.norm(chord, axis=1, keepdims=True)
         one, two = (out[segment] for segment in self._segments_at(at[which]))
         turn, own = _angle(one, two), _angle(one, -slave_normals[which])
-        angle = np.clip(own, 0.0, np.maximum(turn, 0.0))[:, None]
+        angle = np.clip(own, np.minimum(turn, 0.0), np.maximum(turn, 0.0))[:, None]
         across = np.stack([-one[:, 1], one[:, 0]], axis=1)
-        outward = (turn > 0.0)[:, None]  # into a notch there is no such choice
         normal = location.normal.copy()
-        normal[which] = np.where(outward, np.cos(angle) * one + np.sin(angle) * across, normal[which])
+        normal[which] = np.cos(angle) * one + np.sin(angle) * across
         return replace(location, normal=normal, gap=np.sum(normal * (slaves - location.point), axis=1))
 
 

@@ -18,6 +18,7 @@ from functools import cache
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.optimize import nnls
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
@@ -331,11 +332,11 @@ class FacetSurface:
         return bend
 
     def at_corners(self, location: Location, slaves: Array, slave_normals: Array) -> Location:
-        """Places of undisplaced slaves (m, 3) [m] where those that lie on an outward edge look the way their own
-        normals (m, 3) say, as far as the normals of both sides of the edge enclose that.
+        """Places of undisplaced slaves (m, 3) [m] where those that lie on an edge look the way their own normals (m, 3)
+        say, as far as the normals of both sides of the edge, or of all sides where edges meet, enclose that.
 
-        Which of its sides is nearer there rounding decides. Slaves without a normal keep that side's. Where edges meet,
-        that one counts which lets a slave look most its own way.
+        Which of its sides is nearer there rounding decides, of an inward edge as of an outward one. Slaves without a
+        normal keep that side's.
         """
         if not self.sharp.any():
             return location
@@ -351,22 +352,20 @@ class FacetSurface:
         smoothed = self._normals(self.positions)
         normal = location.normal.copy()
         for slave in which.tolist():
-            place, own = slaves[slave], -slave_normals[slave]
-            best = -np.inf
+            place = slaves[slave]
+            sides: list[Array] = []
             close = np.linalg.norm(0.5 * (self.positions[begin] + self.positions[end]) - place, axis=1) <= size[facet]
             for k in np.flatnonzero(close).tolist():
                 ends = self.positions[begin[k : k + 1]], self.positions[end[k : k + 1]]
                 _, along, far = nearest_edges(place[None], *ends, bends[k : k + 1])
                 if far[0] > EDGE_TOLERANCE * size[facet[k]]:
                     continue
-                both = np.zeros((2, 3))
-                for i, side in enumerate((facet[k], self.neighbours[facet[k], edge[k]])):
+                for side in (facet[k], self.neighbours[facet[k], edge[k]]):
+                    looks = np.zeros(3)
                     for node, part in ((begin[k], 1.0 - along[0]), (end[k], along[0])):
-                        both[i] += part * smoothed[self.groups[side, int(np.argmax(self.facets[side] == node))]]
-                both /= np.linalg.norm(both, axis=1, keepdims=True)
-                looks = _between(both[0], both[1], (ends[1] - ends[0])[0], own)
-                if looks is not None and looks @ own > best:
-                    best, normal[slave] = looks @ own, looks
+                        looks += part * smoothed[self.groups[side, int(np.argmax(self.facets[side] == node))]]
+                    sides.append(looks / np.linalg.norm(looks))
+            normal[slave] = _enclosed(sides, -slave_normals[slave], location.normal[slave])
         return replace(location, normal=normal, gap=np.sum(normal * (slaves - location.point), axis=1))
 
     def _over_rim(self, facet: IntArray, offset: Array, normal: Array, normals: Array, current: Array) -> BoolArray:
@@ -399,16 +398,15 @@ class FacetSurface:
         return np.where(apart[:, None], scaled, mean)
 
 
-def _between(one: Array, two: Array, along: Array, own: Array) -> Array | None:
-    """The direction (3,) nearest to another among those that the normals of both sides of an edge enclose; None into a
-    notch. along (3,): with the first side on its left."""
-    along = along / np.linalg.norm(along)
-    across = np.cross(along, one)
-    turn, angle = (np.arctan2(v @ across, v @ one) for v in (two, own))
-    if turn <= 0.0:
-        return None
-    angle = np.clip(angle, 0.0, turn)
-    return np.cos(angle) * one + np.sin(angle) * across
+def _enclosed(sides: list[Array], own: Array, otherwise: Array) -> Array:
+    """The direction (3,) nearest to ``own`` among those that the normals of sides enclose, their sums with positive
+    parts; another one where all of them look away from it."""
+    if not sides:
+        return otherwise
+    enclosing = np.stack(sides, axis=1)
+    nearest = enclosing @ nnls(enclosing, own)[0]
+    length = float(np.linalg.norm(nearest))
+    return nearest / length if length > 0.0 else otherwise
 
 
 def _splits(kind: str) -> list[list[int]]:

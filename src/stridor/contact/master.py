@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, fields
+from typing import Any, Protocol
 
 from ..typing import Array, BoolArray, IntArray
 
@@ -35,6 +35,16 @@ class Location:
             self.nodes[index], self.weights[index], self.point[index], self.normal[index], self.gap[index],
             self.facet[index], self.inside[index], local,
         )  # fmt: skip
+
+    def with_places(self, index: IntArray, others: Location) -> Location:
+        """These points, with others (s,) in the place of those of an index (s,)."""
+        values: dict[str, Any] = {}
+        for part in fields(self):
+            mine, theirs = getattr(self, part.name), getattr(others, part.name)
+            values[part.name] = mine if mine is None else mine.copy()
+            if mine is not None:
+                values[part.name][index] = theirs
+        return Location(**values)
 
 
 class MasterSurface(Protocol):

@@ -139,6 +139,9 @@ def _facing(
 ) -> tuple[IntArray, Location]:
     """Indices (q,) of the slave nodes that take part and their places. CaseError where there are none."""
     location = master.locate(position)
+    if isinstance(master, Curve | FacetSurface):
+        # In a corner which of its sides is nearer must not decide either.
+        location = master.at_corners(location, position, normals)
     # A node that looks along the master is beside it: rounding must not decide.
     opposed = np.sum(normals * location.normal, axis=1) < -1e-9
     opposed |= ~np.any(normals, axis=1)

@@ -18,6 +18,7 @@ from ..typing import Array, BoolArray, IntArray
 from .clipping import common_triangles
 from .curve import Curve
 from .facets import FacetSurface
+from .master import Location
 
 # A facet of which less than this is found over the master, or more than all, is integrated without pieces.
 LEAST_COVER = 0.9
@@ -95,6 +96,24 @@ def pieces(kind: str, facets: Array, under: Array, below: NodeLine | Outlines) -
         np.concatenate([local[keep], np.tile(plain_local, (len(rest), 1))]),
         np.concatenate([weight[keep], np.tile(plain_weight, len(rest))]),
     )
+
+
+def places_below(
+    master: Curve | FacetSurface, at: Array, outward: Array, displacement: Array | None, guess: IntArray
+) -> Location:
+    """Places of points (q, d) [m] on slave facets with unit normals outward (q, d), searched from facets (q,) of the
+    master.
+
+    A node in a notch is on either flank. Where these turn by more than a right angle, a search from the wrong one ends
+    on it, as its feet lie within; what does not face the slave's facet there is searched anew.
+    """
+    found = master.locate(at, displacement, guess=guess)
+    astray = np.flatnonzero(np.sum(outward * found.normal, axis=1) > OPPOSED)
+    if not len(astray):
+        return found
+    anew = master.locate(at[astray], displacement)
+    better = np.flatnonzero(np.sum(outward[astray] * anew.normal, axis=1) < OPPOSED)
+    return found.with_places(astray[better], anew.only(better))
 
 
 def covered(kind: str, facets: Array, under: Array, below: NodeLine | Outlines) -> Points:

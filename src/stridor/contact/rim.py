@@ -29,7 +29,7 @@ from .curve import Curve
 from .facets import SPLITS, FacetSurface
 from .interpolation import element_weights
 from .master import Location
-from .pieces import MOST_COVER, OPPOSED, Points, covered, outlines
+from .pieces import MOST_COVER, OPPOSED, Points, covered, outlines, places_below
 
 # A part of a facet of which less lies over the master is rounding.
 LEAST = 1e-12
@@ -291,11 +291,11 @@ def _above(
     points = covered(kind, position[block], location.point[block].mean(axis=1), outlines(master, current))
     values = shape_functions(kind, points.local)[0]
     at = np.einsum("qr,qrd->qd", values, position[block[points.owner]])
-    found = master.locate(at, displacement, guess=location.facet[block[points.owner, 0]])
+    normal = facet_normals(position, block, kind)[points.owner]
+    found = places_below(master, at, normal, displacement, location.facet[block[points.owner, 0]])
     if isinstance(master, FacetSurface):
         return points, at, found
     # In the plane pieces end where the master does, so that all points of one are above it or none.
-    normal = facet_normals(position, block, kind)[points.owner]
     above = np.flatnonzero(found.inside & (np.sum(normal * found.normal, axis=1) < OPPOSED))
     return Points(points.owner[above], points.local[above], points.weight[above]), at[above], found.only(above)
 

@@ -51,9 +51,49 @@ def cell_facets(cells: Blocks, points: Array) -> CellFacets:
 
 
 def outer_facets(cells: Blocks, points: Array) -> dict[str, IntArray]:
-    """Facets by kind (f, n) that belong to one cell only, oriented outward."""
+    """Facets by kind (f, n) that belong to one cell only, oriented outward; none between a hexahedron and two
+    tetrahedra, which are inside the body though no cell shares them (`quadrilaterals_on_triangles`)."""
     every = cell_facets(cells, points)
+    outer = _outer(every)
+    return _split(every, outer & ~_diagonal(every, outer))
+
+
+def facets_of_one_cell(every: CellFacets) -> dict[str, IntArray]:
+    """Facets by kind (f, n) whose corners are those of no other cell's."""
     return _split(every, _outer(every))
+
+
+def quadrilaterals_on_triangles(every: CellFacets) -> dict[str, IntArray]:
+    """Quadrilaterals by kind (f, n) whose corners are those of two triangles on their other side."""
+    found = _split(every, _diagonal(every, _outer(every)))
+    return {kind: facets for kind, facets in found.items() if FACET_CORNERS[kind] == 4}
+
+
+def _diagonal(every: CellFacets, outer: BoolArray) -> BoolArray:
+    """Which of all facets (f,), of those of one cell only, are quadrilaterals whose corners are those of two triangles,
+    and which those triangles."""
+    found = np.zeros(len(every.corners), dtype=bool)
+    four = np.flatnonzero(outer & (every.corners[:, 3] >= 0))
+    three = np.flatnonzero(outer & (every.corners[:, 3] < 0) & (every.corners[:, 2] >= 0))
+    if not (len(four) and len(three)):
+        return found
+    # Only where corners are those of the other kind can there be any: few facets of many.
+    both = np.zeros((2, int(every.corners.max()) + 1), dtype=bool)
+    both[0, every.corners[four]] = both[1, every.corners[three, :3]] = True
+    four = four[both[1, every.corners[four]].all(axis=1)]
+    three = three[both[0, every.corners[three, :3]].all(axis=1)]
+    if not (len(four) and len(three)):
+        return found
+    # Corners are sorted, so that each diagonal cuts off two of the four triples.
+    triples = [every.corners[four][:, [i for i in range(4) if i != left]] for left in range(4)]
+    identity = _identities(np.concatenate([every.corners[three, :3], *triples]))
+    known = identity[: len(three)]
+    there = identity[len(three) :].reshape(4, len(four))
+    across = np.isin(there, known)
+    cut = across.sum(axis=0) == 2
+    found[four[cut]] = True
+    found[three[np.isin(known, there[:, cut][across[:, cut]])]] = True
+    return found
 
 
 def facets_within(cells: Blocks, points: Array, nodes: IntArray) -> dict[str, IntArray]:

@@ -1,7 +1,9 @@
-"""Nodes between corners that belong to the cells on one side only: there a mesh is open, though it looks whole.
+"""Where cells of two kinds share nodes and yet do not fit: there a mesh is open, though it looks whole.
 
-Where a quadratic cell has a linear neighbour, its midside node lies on the diagonal of a neighbour's face, or a face
-with a node in its middle has one without as its other side.
+Nodes between corners belong to the cells on one side only where a quadratic cell has a linear neighbour, its midside
+node lies on the diagonal of a neighbour's face, or a face with a node in its middle has one without as its other side.
+Of a hexahedron beside two tetrahedra all nodes may be shared: its face is bilinear, or biquadratic, where theirs are
+two triangles.
 """
 
 from __future__ import annotations
@@ -10,10 +12,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..typing import BoolArray, IntArray
-from .boundary import CellFacets, cell_facets, outer_facets
+from ..typing import Array, BoolArray, IntArray
+from .boundary import CellFacets, cell_facets, facets_of_one_cell, quadrilaterals_on_triangles
 from .kinds import FACET_CORNERS, KINDS
 from .model import Mesh
+
+# Kinds that may share all nodes of a face and two triangles.
+ALIKE = (("hexahedron", "tetra"), ("hexahedron27", "tetra10"))
 
 
 def hanging(mesh: Mesh) -> IntArray:
@@ -30,11 +35,23 @@ def hanging(mesh: Mesh) -> IntArray:
                 pairs, middles = np.concatenate([pairs, pair]), np.concatenate([middles, block[:, middle]])
     every = cell_facets(mesh.cells, mesh.points)
     if len(middles) and mesh.dimension == 3:
-        for kind, block in outer_facets(mesh.cells, mesh.points).items():
-            if FACET_CORNERS[kind] == 4:
+        for kind, block in facets_of_one_cell(every).items():
+            if FACET_CORNERS[kind] == 4 and kind != "quad9":  # this has a node where two triangles have one
                 across = [np.sort(block[:, pair], axis=1) for pair in ([0, 2], [1, 3])]
                 straight = np.concatenate([straight, *across])
     return np.unique(np.concatenate([middles[_among(pairs, straight)], _of_faces(every)]))
+
+
+def on_two_triangles(mesh: Mesh) -> Array:
+    """Middles (q, 3) [m] of faces whose nodes are those of two triangles on their other side, between which both move
+    apart. Faces with a node too few or too many for that are told by `hanging`."""
+    found = [_none(4)]
+    for pair in ALIKE:
+        cells = {kind: mesh.cells[kind] for kind in pair if len(mesh.cells.get(kind, ()))}
+        if len(cells) == len(pair):
+            faces = quadrilaterals_on_triangles(cell_facets(cells, mesh.points))
+            found += [block[:, :4] for block in faces.values()]
+    return mesh.points[np.concatenate(found)].mean(axis=1)
 
 
 def _of_faces(every: CellFacets) -> IntArray:

@@ -18,7 +18,7 @@ from ..contact.facets import CORNER_DEG, FacetSurface
 from ..contact.rim import steps_between_pieces
 from ..errors import AnalysisError
 from ..matrices.report import LOST, NO_FRICTION
-from ..mesh.hanging import hanging
+from ..mesh.hanging import hanging, on_two_triangles
 from ..mesh.model import Mesh
 from ..mesh.quality import edge_lengths, pieces
 from ..notebook import Shown, counted, html_table
@@ -400,6 +400,14 @@ def mesh_warnings(case: Case, system: System) -> list[str]:
                 f"{where}: {counted(len(open_at), 'midside node')} {belong} to the cells on one side only, the first "
                 f"at ({place}): the mesh is open along {edges}; take linear or quadratic cells on both sides, or "
                 "tie two bodies"
+            )
+        if len(faces := on_two_triangles(mesh)):
+            place = ", ".join(f"{x:.6g}" for x in faces[0])
+            ends = "its corners" if len(faces) == 1 else "their corners"
+            found.append(
+                f"{where}: {counted(len(faces), 'face')} of hexahedra on two triangles of tetrahedra, the first at "
+                f"({place}): the mesh is open between {ends}, as a face bends where triangles are flat; take cells "
+                "of one kind on both sides, or tie two bodies"
             )
         for point, position in body.points.items():
             off = float(np.min(np.linalg.norm(solid.points - np.array(position), axis=1)))
