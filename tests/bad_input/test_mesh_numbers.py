@@ -306,6 +306,20 @@ def test_vtk(number, tmp_path):
     told(tmp_path / "a.vtk", f"{text}CELLS 1 4\n3 0 1 {number}\nCELL_TYPES 1\n5\n")
 
 
+@pytest.mark.parametrize("kind", [-1, 11, 4, 256, 10**20])
+def test_vtk_cells_of_a_type_that_is_not_theirs(kind, tmp_path):
+    """The reader passes over them, and the body would have a hole."""
+    points = " ".join(f"{x} {y} 0" for y in (0, 1) for x in range(5))
+    cells = "OFFSETS vtktypeint64\n0 4 8 12 15 18\nCONNECTIVITY vtktypeint64\n0 1 6 5 1 2 7 6 2 3 8 7 3 4 9 3 9 8\n"
+    text = "# vtk DataFile Version 5.1\na\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 10 double\n"
+    text += f"{points}\nCELLS 6 18\n{cells}"
+    path = tmp_path / "good.vtk"
+    path.write_text(f"{text}CELL_TYPES 5\n9\n9\n9\n5\n5\n")
+    assert sum(len(cells) for cells in read_mesh(path).cells.values()) == 5
+    message = told(tmp_path / "a.vtk", f"{text}CELL_TYPES 5\n9\n{kind}\n9\n5\n5\n")
+    assert "has 5 cells, of which 4 can be read" in message
+
+
 # -- overlapping elements ---------------------------------------------------------------------------------------------
 def test_two_cells_on_one_side_of_an_edge():
     points = np.array([[0.0, 0], [1, 0], [0.5, 1], [0.4, 0.6], [0.5, -1]])

@@ -8,6 +8,7 @@ import functools
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -205,6 +206,30 @@ def test_a_note_where_other_nodes_touch_at_another_friction(tmp_path: Path) -> N
     assert written.load_names == ("press",)
     load = sio.mmread(tmp_path / "loads.mtx").toarray()[:, 0]
     assert np.array_equal(load, st.build_system(case).loads["press"])
+
+
+@pytest.mark.parametrize("held", [1, 2])
+def test_a_note_where_other_nodes_stick_at_another_friction(held: int, tmp_path: Path) -> None:
+    """A mass that slides on a belt, and one or two beside it that their walls hold by sticking."""
+    names = ["n", "o"][:held]
+    tables: dict[str, Any] = {
+        "units": "nondimensional", "steady": {"friction": "stick-slip"}, "modal": {"max_frequency_hz": 1.0},
+        "bodies": {"belt": {"type": "obstacle", "shape": "flat", "point": [0, 0], "normal": [0, 1],
+                            "sliding": {"velocity": [-1.0, 0.0]}}},
+        "loads": {}, "contacts": {}, "springs": {},
+    }  # fmt: skip
+    for k, name in enumerate(["m", *names]):
+        tables["bodies"][name] = {"type": "mass", "mass": 1.0, "position": [3.0 * k, 0.0]}
+        tables["loads"][f"press_{name}"] = {"at": name, "force": [0.1 * k, -1.0]}
+        tables["springs"][f"k_{name}"] = {"between": [name, "ground"], "stiffness": 2.0, "direction": [1.0, 0.3]}
+        master = "belt" if name == "m" else f"wall_{name}"
+        if name != "m":
+            tables["bodies"][master] = {"type": "obstacle", "shape": "flat", "point": [3.0 * k, 0], "normal": [0, 1]}
+        tables["contacts"][f"rub_{name}"] = {
+            "slave": name, "master": master, "stiffness": 1.3, "friction": {"law": "coulomb", "coefficient": 0.5}
+        }  # fmt: skip
+    written = st.export(st.Case.model_validate(tables), tmp_path)
+    assert f"other contact nodes stick at mu = 1 ({held}) than at the case's own (0), which Kc and Kf are made of" in written.notes
 
 
 def test_a_note_where_contacts_kept_closed_pull_at_another_friction(tmp_path: Path) -> None:

@@ -222,6 +222,8 @@ def test_what_is_said_of_a_sector_is_said_of_motions_alike_in_all_sectors_alone(
     assert any(said.startswith("ties.one: bodies repeat") for said in sector.warnings)
     for said in (every.completeness[0], of_modes(every, "0.4").sentence, *whole.warnings):
         assert "alike" not in said
+    both = st.compare(sector.with_({"comparison.critical": False}), [0.4])
+    assert "all of it is of motions alike in all sectors alone (ties.one)" in both.notes
 
 
 DOUBLE = """

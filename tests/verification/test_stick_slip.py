@@ -392,3 +392,11 @@ def test_the_program_counts_and_writes_what_sticks(tmp_path):
     codes = {"open": OPEN, "stick": STICK, "slip": SLIP}
     assert document["status"] == {name: int(np.count_nonzero(found.status == code)) for name, code in codes.items()}
     assert any(name.endswith("steady.vtu") for name in document["files"])
+
+
+def test_onsets_where_a_contact_with_friction_is_moved_by_nothing():
+    """It slides at no friction alone, which is no range."""
+    tables = st.load(PAD).model_dump(mode="json", exclude_none=True)
+    tables["steady"] = {}
+    with pytest.raises(AnalysisError, match="contact abutment does not slide: no support moves"):
+        st.onsets(st.Case.model_validate(tables), (0.0, 0.5))

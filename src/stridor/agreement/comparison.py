@@ -13,6 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from ..case.repeating import ALIKE
 from ..digits import readable
 from ..errors import AnalysisError, CaseError
 from ..modal.complex_modes import ComplexModes
@@ -140,6 +141,8 @@ def compare(
 
 def _notes(system: System, parts: Collection[str], taken: Sequence[str]) -> list[str]:
     notes: list[str] = []
+    if system.repeating:
+        notes.append(f"all of it is of {ALIKE} alone ({', '.join(system.repeating)})")
     if finite := system.finitely_sliding:
         full = "in the full run" if "run" in parts else "in `stridor simulate`"
         notes.append(

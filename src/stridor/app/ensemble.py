@@ -106,8 +106,10 @@ def _show(result: Ensemble) -> None:
     varying = varying or ["mu"]
     swept = any(result.sweep)
     slower = np.isfinite(result.stronger_below_hz)
+    # Of several contacts the largest share each: a row has no place for all of them.
+    shown = [name if result.stick.shape[1] < 2 else f"{name}, most" for name in ("stick", "slip", "separation")]
     heads = [*varying, *(["sweep"] if swept else []), "regime", f"rms [{result.unit}]", "frequency [Hz]",
-             *(["stronger below [Hz]"] if slower.any() else []), "stick", "slip", "separation", "mode"]  # fmt: skip
+             *(["stronger below [Hz]"] if slower.any() else []), *shown, "mode"]  # fmt: skip
     rows: list[list[str]] = []
     for k in range(min(len(result), MOST_ROWS)):
         shares = [f"{t[k].max():.1%}" if t.shape[1] and np.isfinite(t[k]).all() else "–" for t in
@@ -127,7 +129,7 @@ def _show(result: Ensemble) -> None:
         )
     title = f"{result.observable} from {result.window[0]:.4g} to {result.window[1]:.4g} s, {result.how}"
     words = ["regime", *(["sweep"] if swept else [])]
-    table(title, heads, rows, drop=["slip", "stick", "separation"], words=words, kept_in="ensemble.csv")
+    table(title, heads, rows, drop=[shown[1], shown[0], shown[2]], words=words, kept_in="ensemble.csv")
     if len(result) > MOST_ROWS:
         stdout.print(f"  {len(result) - MOST_ROWS} more of {len(result)} in ensemble.csv")
     for note in result.notes:

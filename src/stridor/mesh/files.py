@@ -22,7 +22,7 @@ from ..reading import bounded
 from ..typing import IntArray
 from .abaqus import read_abaqus
 from .boundary import require_boundary as require_boundary
-from .claims import check_claims
+from .claims import check_claims, claimed_cells
 from .gather import Contents, gather
 from .gmsh_numbers import check_numbers
 from .kinds import KINDS
@@ -64,6 +64,7 @@ def read_mesh(
             if suffix == ".msh":
                 check_numbers(file, f"{where}.file")
             raw = _through_meshio(file, suffix, f"{where}.file")
+            _require_all_cells(raw, file, suffix, f"{where}.file")
             contents = _gmsh_contents(raw) if suffix == ".msh" else _vtk_contents(raw)
             return gather(contents, source=file.name, where=where, group=group, scale=scale)
     except MemoryError as error:
@@ -98,6 +99,18 @@ def _through_meshio(file: Path, suffix: str, where: str) -> Any:
             reason = f"it breaks off, or holds something else where numbers should be ({reason})"
         reason = reason or "its reader gives no reason; it is cut short or damaged, or of a kind that is not read"
         raise CaseError(where, shown_path(file), f"is not readable as {_LOOKS[suffix]}: {reason}") from error
+
+
+def _require_all_cells(raw: Any, file: Path, suffix: str, where: str) -> None:
+    """Raise CaseError for cells that meshio passed over: a VTK file's of a type that it does not know, or whose nodes
+    are not as many as the type has."""
+    claimed, read = claimed_cells(file, suffix), sum(len(block.data) for block in raw.cells)
+    if claimed is not None and claimed != read:
+        raise CaseError(
+            where, shown_path(file),
+            f"has {claimed} cells, of which {read} can be read; are the types of the others known, and do they have as "
+            "many nodes as their cells?",
+        )  # fmt: skip
 
 
 def _dimension(kind: str) -> int:

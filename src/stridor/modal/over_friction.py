@@ -267,9 +267,10 @@ def _solved_onsets(
     over = stretches(system, low, high, solver=options.solver)
     if len(over) == 1 and not over[0].reason:
         return solved(over[0].of(system), (low, high))
-    solid = [s for s in over if not s.reason]
+    # Where contact slides without friction alone there is no range.
+    solid = [s for s in over if not s.reason and s.low < s.high]
     if not solid:
-        raise AnalysisError(over[0].reason)
+        raise AnalysisError(next(s.reason for s in over if s.reason))
     parts: list[tuple[Stretch, Onsets]] = []
     for s in solid:
         parts.append((s, solved(s.of(system), (s.low, s.high), parts[-1][1] if parts else None)))

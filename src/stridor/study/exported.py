@@ -194,6 +194,8 @@ def _other_nodes(work: Workspace, system: System, contact: ContactProblem) -> tu
     """A note where other nodes touch at the ends of the range of μ than at the contacts' own coefficients."""
     if not anything_acts(system):
         return ()
+    nodes, solver = system.contact_nodes(), work.options.solver
+    stuck = touching_nodes(system, nodes, None, solver).stuck
     for mu in work.modal.friction_range:
         try:
             there = problem_of(system, mu, work.options)
@@ -203,6 +205,12 @@ def _other_nodes(work: Workspace, system: System, contact: ContactProblem) -> tu
             return (
                 f"other contact nodes touch at mu = {mu:g} ({len(there.touching)}) than at the case's own "
                 f"({len(contact.touching)}), which Kc and Kf are made of",
+            )
+        others = touching_nodes(system, nodes, mu, solver).stuck
+        if not np.array_equal(others, stuck):
+            return (
+                f"other contact nodes stick at mu = {mu:g} ({np.count_nonzero(others)}) than at the case's own "
+                f"({np.count_nonzero(stuck)}), which Kc and Kf are made of",
             )
         if turned := _turned(contact.slide, there.slide):
             which = "1 contact node kept closed has" if turned == 1 else f"{turned} contact nodes kept closed have"

@@ -120,9 +120,11 @@ def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver
         stuck, still = steady.active & (steady.status == STICK), int(steady.slips_still.sum())
         closed, slips = int(steady.active.sum()), int((steady.status == SLIP).sum())
         limit = f" ({still} of them at their limit without a slip velocity, taken as sliding)" if still else ""
+        holds, opened = int(np.count_nonzero(stuck)), nodes.count - closed
         words = (
-            f"{np.count_nonzero(stuck)} contact nodes stick, {slips} slip{limit} and {nodes.count - closed} are open, "
-            f"as the static equilibrium at {'their own friction' if mu is None else f'μ = {mu:g}'} has them"
+            f"{'1 contact node sticks' if holds == 1 else f'{holds} contact nodes stick'}, {slips} "
+            f"slip{'s' if slips == 1 else ''}{limit} and {opened} {'is' if opened == 1 else 'are'} open, as the static "
+            f"equilibrium at {'their own friction' if mu is None else f'μ = {mu:g}'} has them"
         )
         return TouchingNodes(steady.active, steady.sense, stuck, still > 0, words, steady.normal_force)
     slip = nodes.slip_velocity(full_motion(system))

@@ -7,6 +7,7 @@ its segment, as ten rows; normal and tangent are mixtures of them, found anew in
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
 from ...contact import surface
+from ...contact.interface import Contact
 from ...errors import CaseError
 from ...kernels import njit
 from ...system import System
@@ -101,11 +103,43 @@ def nodes_of(segment: int, count: int) -> IntArray:
     return np.where((nodes >= 0) & (nodes < count), nodes, -1)
 
 
+def found_at(contact: Contact, u: Array, x: Array) -> Contact:
+    """A contact with foot, rows and gap as they are where the structure is at u (n,) and the supports at x (p,), for
+    displacements that count from the same place; as it was where its slave is beyond an end there."""
+    place = contact.slave_position + contact.slave.free @ u + contact.slave.lift @ x
+    line = contact.master_positions + (contact.master.free @ u + contact.master.lift @ x).reshape(-1, 2)
+    at, normal, tangent = foot(), np.zeros(ROWS), np.zeros(ROWS)
+    segment, xi, nodes = contact.segment, contact.xi, nodes_of(contact.segment, len(line))
+    for _ in range(len(line)):
+        nodes = nodes_of(segment, len(line))
+        at.nodes[:] = np.where(nodes[:, None] >= 0, line[nodes], 0.0)
+        xi, on_line = project_in(segment, float(place[0]), float(place[1]), xi, contact.chords, at)
+        if not on_line:
+            return contact
+        if not leaves(segment, xi, len(contact.chords)):
+            break
+        segment, xi = follow(segment, xi, contact.chords)
+    turn(float(contact.side), at, normal, tangent)
+    gap = float(normal @ np.concatenate([place, at.nodes.ravel()]))
+    found: dict[str, Array] = {}
+    for name, weights in (("normal", normal), ("tangent", tangent)):
+        row, lift = contact.slave.free.T @ weights[:2], contact.slave.lift.T @ weights[:2]
+        for k in np.flatnonzero(nodes >= 0).tolist():
+            mine, part = slice(2 * int(nodes[k]), 2 * int(nodes[k]) + 2), weights[2 + 2 * k : 4 + 2 * k]
+            row, lift = row + contact.master.free[mine].T @ part, lift + contact.master.lift[mine].T @ part
+        found |= {f"{name}_row": np.asarray(row), f"{name}_lift": np.asarray(lift)}
+    gap -= float(found["normal_row"] @ u)
+    return replace(
+        contact, segment=segment, xi=xi, gap=gap, normal_row=found["normal_row"], normal_lift=found["normal_lift"],
+        tangent_row=found["tangent_row"], tangent_lift=found["tangent_lift"],
+    )  # fmt: skip
+
+
 def left_the_line(name: str, time: float, phase: str) -> str:
     """What to say of a slave that is beyond an end of its master."""
     return (
         f"contact {name}: the slave point left the master line over an end at t = {time:.6g} s "
-        f"(phase {phase}); shorten the phase, slow the support down or lengthen the master"
+        f"(phase {phase}); shorten the phase, slow the support down, move the slave inwards or lengthen the master"
     )
 
 

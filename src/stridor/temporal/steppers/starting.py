@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
+from ...contact.interface import Contact
+from ...sliding import SteadySliding, steady_sliding
 from ...system import System
 from ...typing import Array
-from ..schedule import PhaseSpec, Schedule, lay_out
+from ..schedule import PhaseSpec, Schedule, Stretch, lay_out
 from ..settings import Settings
 from ..stepper import Disturbance
+from .curve import found_at
 
+TURNS = 8  # solutions, each on the line of the one before
 OVERLAP = 1e-6  # of its terms: what of a closed gap is rounding
 
 
@@ -31,6 +36,62 @@ def motion_of_bodies(system: System, schedule: Schedule) -> Disturbance | None:
     mass, diagonal = system.mass, system.mass.diagonal()
     # The scheme starts from the acceleration that the forces give; a consistent mass only delays it by half a step.
     return displacement, velocity, force / diagonal if mass.nnz == np.count_nonzero(diagonal) else zero
+
+
+def steady_start(system: System, stretch: Stretch) -> tuple[SteadySliding, tuple[Contact, ...]]:
+    """Steady sliding under the loads and motions with which a run begins, and the point contacts as they are then.
+
+    Points that slide finitely rest on the bent line, and push along its normal there: on rows of the undeformed line
+    their gap would not be zero by the square of how far that has turned, which rigid contact would take back within one
+    step. Raises what `steady_sliding` does."""
+    placed, beyond = system.in_place(stretch.distances_after), system.motion.lift @ stretch.distances_after
+
+    def under(contacts: tuple[Contact, ...]) -> SteadySliding:
+        return steady_sliding(
+            placed if contacts is placed.contacts else replace(placed, contacts=contacts),
+            load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
+            motion_factors=stretch.velocities_after,
+        )
+
+    contacts, before = placed.contacts, np.inf
+    found = under(contacts)
+    if system.load_steps or all(contact.sliding == "small" for contact in contacts):
+        return found, contacts
+    for _ in range(TURNS):
+        u = found.displacement - beyond
+        # The gap is that of the displacement which carries the structure along with prescribed distances.
+        others = tuple(
+            own if own.sliding == "small" else found_at(own, u, stretch.distances_after) for own in placed.contacts
+        )
+        again = under(tuple(_resting(*both, beyond) for both in zip(others, placed.contacts, strict=True)))
+        moved = float(np.abs(again.displacement - found.displacement).max(initial=0.0))
+        if not moved < 0.5 * before:
+            break
+        found, contacts, before = again, others, moved
+    return found, contacts
+
+
+def _resting(turned: Contact, own: Contact, beyond: Array) -> Contact:
+    """A contact as it stands, for displacements that carry the structure along with prescribed distances by ``beyond``
+    (n,); supports move it as they do the undeformed one, along which steady sliding keeps its gap."""
+    if turned is own:
+        return own
+    gap = turned.gap - float(turned.normal_row @ beyond)
+    return replace(turned, gap=gap, normal_lift=own.normal_lift, tangent_lift=own.tangent_lift)
+
+
+def along_the_line(system: System, steady: SteadySliding, contacts: Sequence[Contact], velocities: Array) -> Array:
+    """Velocity (n,) with which a run begins so that supports' ``velocities`` (p,) neither press contacts of points that
+    slide finitely together nor part them: by impulses along their normals."""
+    rows, rates = list[Array](), list[float]()
+    for contact, active in zip(contacts, steady.active, strict=False):
+        if contact.sliding == "finite" and active and contact.compliance == 0.0:
+            rows.append(contact.normal_row)
+            rates.append(float(contact.normal_lift @ velocities))
+    if not np.any(rates):
+        return np.zeros(system.size)
+    answers = np.stack([impulse(system, row) for row in rows], axis=1)
+    return np.asarray(-answers @ np.linalg.lstsq(np.stack(rows) @ answers, np.array(rates), rcond=None)[0])
 
 
 def impulse(system: System, row: Array) -> Array:

@@ -42,7 +42,7 @@ _solve_kept = njit(cache=True, allocates=False)(multipliers.solve_kept)
 
 SWEEP_LIMIT = 500
 SWEEP_TOLERANCE = 1e-12
-
+ROUNDING = 4.0 * 2.0**-52
 
 
 class LoopState(NamedTuple):
@@ -135,7 +135,7 @@ def _solve_all(
             return c
         if contacts.compliance[c] > 0.0:
             scratch.earlier[c] = _gap_before(c, contacts, scheme, state, scratch)
-    largest = 0.0
+    largest = noise = 0.0
     sweeps = 0
     for c in range(count):
         state.normal[c] = 0.0
@@ -147,6 +147,14 @@ def _solve_all(
             base = contacts.base[c]
             width = 10 if contacts.kind[c] == _FINITE else 2
             gap, slip, w_nn, w_nt, w_tt = _local_problem(c, base, width, contacts, compliance, state, scratch)
+            if sweeps == 1 and width == 10 and count > 1:
+                # Gaps out of coordinates are known to the rounding of these, and forces to that.
+                size = 0.0
+                for a in range(width):
+                    size += abs(scratch.shape[c, a]) * (
+                        abs(reference(c, a, contacts, state)) + abs(scratch.displacement[base + a])
+                    )
+                noise = max(noise, ROUNDING * size / max(w_nn, 1e-300))
             # Free of this contact's own present forces.
             old_n, old_t = state.normal[c], state.tangential[c]
             if contacts.compliance[c] > 0.0:
@@ -171,7 +179,7 @@ def _solve_all(
                         state.force[base + a] += p
                         for r in range(rows):
                             scratch.displacement[r] += compliance[r, base + a] * p
-        if count == 1 or change <= SWEEP_TOLERANCE * max(largest, 1e-300):
+        if count == 1 or change <= max(SWEEP_TOLERANCE * max(largest, 1e-300), noise):
             break
     for c in range(count):
         state.status[c] = int(scratch.delta[c])

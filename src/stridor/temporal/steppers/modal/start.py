@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from ....errors import CaseError
-from ....sliding import steady_sliding
 from ....system import System
 from ....system.uncoupled import UncoupledModes
 from ....typing import Array
 from ...schedule import Schedule
 from ...settings import Settings
 from ...stepper import Disturbance
-from ..starting import impulse, motion_of_bodies
+from ..starting import along_the_line, impulse, motion_of_bodies, steady_start
 from .machine import Machine
 
 
@@ -27,12 +26,9 @@ def initial_state(
     system, fields, state = machine.system, machine.fields, machine.state
     if settings.initial == "steady-sliding":
         stretch = schedule.stretches[0]
-        steady = steady_sliding(
-            system.in_place(stretch.distances_after),
-            load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
-            motion_factors=stretch.velocities_after,
-        )
-        velocity = np.zeros(system.size)
+        steady, contacts = steady_start(system, stretch)
+        state.segment[:], state.xi[:] = [c.segment for c in contacts], [c.xi for c in contacts]
+        velocity = along_the_line(system, steady, contacts, stretch.velocities_after)
         for contact in system.contacts:
             velocity += settings.perturbation * _slip_impulse(system, contact.tangent_row)
         fields.u[:] = machine.coordinates(steady.displacement - system.motion.lift @ stretch.distances_after, modes)

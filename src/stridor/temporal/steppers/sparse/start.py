@@ -6,13 +6,12 @@ import numpy as np
 
 from ....contact.nodes import ContactNodes
 from ....errors import CaseError
-from ....sliding.solution import steady_sliding
 from ....system import System
 from ....typing import Array
 from ...schedule import Schedule
 from ...settings import Settings
 from ...stepper import Disturbance
-from ..starting import impulse, motion_of_bodies
+from ..starting import along_the_line, impulse, motion_of_bodies, steady_start
 from .machine import Machine
 from .node_table import sliding_directions
 
@@ -50,18 +49,17 @@ def _steady(machine: Machine, schedule: Schedule, settings: Settings) -> tuple[A
     if stretch.ramp_steps:
         ramp = stretch.ramp_steps * schedule.step
         raise CaseError("phases.0.ramp", ramp, "must be 0 when starting from steady sliding")
-    steady = steady_sliding(
-        system.in_place(stretch.distances_after),
-        load_factors=dict(zip(system.loads, stretch.loads_after, strict=True)),
-        motion_factors=stretch.velocities_after,
-    )
+    steady, contacts = steady_start(system, stretch)
+    machine.contacts.segment[: len(contacts)] = [c.segment for c in contacts]
+    machine.contacts.xi[: len(contacts)] = [c.xi for c in contacts]
+    machine.set_nodes(machine.nodes, machine.turning)
     # The loop counts from the structure that the distances carry along.
     machine.state.motion[0] = steady.travel + stretch.distances_after
     machine.state.motion[1] = stretch.velocities_after
     machine.contacts.force[:, 0] = np.where(steady.active, steady.normal_force, 0.0)
     machine.contacts.force[:, 1:] = steady.friction_force
     machine.contacts.status[:] = steady.status
-    velocity = np.zeros(system.size)
+    velocity = along_the_line(system, steady, contacts, stretch.velocities_after)
     if settings.perturbation:
         for contact in range(len(machine.nodes.names)):
             velocity += settings.perturbation * _slip_impulse(system, machine.nodes, contact)
