@@ -7,6 +7,7 @@ import pytest
 
 import stridor as st
 from stridor.contact.curve import Curve
+from stridor.contact.facets import FacetSurface
 
 
 def line(points, *, closed: bool = False, quadratic: bool = False) -> Curve:
@@ -183,3 +184,23 @@ def test_a_flat_slave_touches_all_of_the_flat_of_a_chamfered_master(tmp_path, mo
     assert steady.resultants["face"].force[1] == pytest.approx(-40.0)
     # Nodes on the corners look the way of the slave: the support above takes friction alone.
     assert abs(steady.resultants["face"].force[0]) == pytest.approx(0.3 * 40.0, rel=1e-12)
+
+
+def test_nine_chords_all_round_are_corners_all_of_them() -> None:
+    """They turn by 40°, the angle itself: rounding must not tell some from others."""
+    angle = 0.3 + np.radians(np.arange(0.0, 361.0, 40.0))
+    points = np.column_stack([np.cos(angle), np.sin(angle)])[::-1]
+    lines = np.column_stack([np.arange(9), np.append(np.arange(1, 9), 0)])
+    curve = Curve.from_facets(points[:9], {"line": lines}, where="nine")
+    ends = np.concatenate([curve.stencils[:, 0], curve.stencils[:, 3]])
+    assert np.count_nonzero(ends < 0) == 18
+
+
+def test_nine_facets_all_round_have_edges_between_all_of_them() -> None:
+    angle = 0.3 + np.radians(np.arange(0.0, 360.0, 40.0))
+    ring = np.column_stack([np.cos(angle), np.sin(angle)])
+    points = np.concatenate([np.column_stack([ring, np.full(9, z)]) for z in (0.0, 1.0)])
+    after = np.append(np.arange(1, 9), 0)
+    quads = np.column_stack([np.arange(9), after, after + 9, np.arange(9) + 9])
+    surface = FacetSurface.from_facets(points, {"quad": quads}, where="nine")
+    assert np.count_nonzero(surface.sharp) == 18

@@ -26,7 +26,8 @@ from stridor.temporal.legs import Member
 from stridor.temporal.schedule import PhaseSpec
 from stridor.temporal.settings import Settings
 from stridor.temporal.simulate import simulate
-from stridor.temporal.steppers.modal import batch, start
+from stridor.temporal.steppers import starting
+from stridor.temporal.steppers.modal import batch
 from stridor.temporal.trajectory import Trajectory
 
 pytestmark = pytest.mark.verification
@@ -286,7 +287,7 @@ def test_a_member_that_cannot_begin_says_why(monkeypatch):
             raise AnalysisError("no equilibrium")
         return steady_sliding(system, **options)
 
-    monkeypatch.setattr(start, "steady_sliding", steady)
+    monkeypatch.setattr(starting, "steady_sliding", steady)
     case = paper_case().with_(COARSE).with_({"temporal.initial": "steady-sliding", "phases.slide.duration": 2e-3})
     found = st.ensemble(case.with_({"phases.press.velocities": {"clamp": 1.0}}), mu=[0.1, 0.9], modes=False)
     assert found.error == ("", "no equilibrium")

@@ -7,6 +7,7 @@ import pytest
 
 import stridor as st
 from stridor.case.source import template_text
+from stridor.errors import AnalysisError
 
 pytestmark = pytest.mark.verification
 
@@ -14,7 +15,7 @@ pytestmark = pytest.mark.verification
 @pytest.mark.parametrize(("path", "mass"), [("modal", "consistent"), ("nodal", "lumped"), ("assembled", "lumped")])
 @pytest.mark.parametrize("mu", [0.05, 0.3])
 def test_a_start_in_steady_sliding_rests_on_the_bent_line(path: str, mass: str, mu: float):
-    """The load is 20 N, and the beam is bent by 15 mm there. On the rows of the undeformed line the first force was
+    """The load is 20 N, and the contact sinks by 1 mm. On the rows of the undeformed line the first force was
     1e5 N with these steps, and sixteen times that with a quarter of them."""
     case = st.loads(template_text("two-beams")).with_(
         {"contacts.A.sliding": "finite", "temporal.initial": "steady-sliding", "temporal.path": path,
@@ -31,6 +32,44 @@ def test_a_start_in_steady_sliding_rests_on_the_bent_line(path: str, mass: str, 
     assert force[1][0] == pytest.approx(force[0][0], rel=5e-4)
     before = st.simulate(case.with_({"temporal.step": 2e-8, "contacts.A.sliding": "small"}), mu).normal_force[:, 0]
     assert force[0][0] == pytest.approx(before[0], rel=0.01)
+
+
+@pytest.mark.parametrize("path", ["modal", "nodal"])
+def test_a_start_far_from_the_undeformed_line_settles(path: str):
+    """The tip is moved down by 10 mm, and friction turns the line far: the solutions, each on the line of the one
+    before, come nearer by less than half at first. What starts at rest in equilibrium stays there."""
+    case = st.loads(template_text("two-beams")).with_(
+        {"contacts.A.sliding": "finite", "temporal.initial": "steady-sliding", "temporal.path": path,
+         "temporal.record_every": 1, "phases.press.velocities.clamp": 1.0, "supports.clamp.velocity.x": 1e-7,
+         "supports.guide": {"at": "beam1.top", "fixed": ["x", "y", "rotation"], "displacement": {"y": -0.01}}}
+        | {f"bodies.{name}.mass": "lumped" for name in ("beam1", "beam2")}
+        | {f"phases.{name}.duration": 2e-6 for name in ("press", "slide")}
+    )  # fmt: skip
+    for step in (2e-8, 5e-9):
+        force = st.simulate(case.with_({"temporal.step": step}), 0.8).normal_force[:, 0]
+        assert force == pytest.approx(183.80998, abs=1e-3)
+
+
+@pytest.mark.parametrize("path", ["modal", "nodal"])
+def test_a_push_along_the_bent_line_presses_nothing(path: str):
+    """Its part along the normal was one force of the first step, which grew as that became smaller."""
+    case = st.loads(template_text("two-beams")).with_(
+        {"contacts.A.sliding": "finite", "temporal.initial": "steady-sliding", "temporal.path": path,
+         "temporal.record_every": 1, "temporal.perturbation": 1e-2, "phases.press.velocities.clamp": 1.0}
+        | {f"bodies.{name}.mass": "lumped" for name in ("beam1", "beam2")}
+        | {f"phases.{name}.duration": 2e-6 for name in ("press", "slide")}
+    )  # fmt: skip
+    first = [st.simulate(case.with_({"temporal.step": step}), 0.3).normal_force[0, 0] for step in (2e-8, 2.5e-9)]
+    assert first == pytest.approx([20.0, 20.0], abs=0.3)
+
+
+def test_a_start_beyond_the_end_of_the_line_is_told():
+    case = st.loads(template_text("two-beams")).with_(
+        {"contacts.A.sliding": "finite", "temporal.initial": "steady-sliding",
+         "phases.press.velocities.clamp": 1.0, "supports.clamp.displacement": {"x": -0.0505}}
+    )  # fmt: skip
+    with pytest.raises(AnalysisError, match="in steady sliding the slave point is beyond an end of the master line; move"):
+        st.simulate(case, 0.1)
 
 
 TWO = """

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 import scipy.linalg as sl
 
+import stridor as st
 from benches import paper_case
 from solid_cases import case, slider
 from stridor.case import Case, loads
+from stridor.case.source import template_text
 from stridor.direct import nearby
 from stridor.errors import CaseError
 from stridor.modal.complex_modes import complex_modes
@@ -354,3 +356,56 @@ def test_systems_with_another_number_are_those_built_and_balanced_anew(monkeypat
             difference = abs(getattr(one, name) - getattr(other, name)).max()
             assert difference <= 1e-13 * abs(getattr(other, name)).max(), (path, name)
     assert 0 < linear._factors.factorisations < len(tried)
+
+
+@pytest.mark.parametrize("elements", [90, 12])
+def test_what_says_where_a_body_lies_has_no_origin(elements: int):
+    """Beams moved together answer as before, one moved along answers as the other moved back, and both as modes solved
+    anew; the contact is on a node, where the curve through nodes has another second derivative on either side."""
+    paths = ["bodies.beam1.start.0", "bodies.beam2.start.0", "bodies.beam2.length"]
+    base = st.loads(template_text("two-beams")).with_({"bodies.beam2.elements": elements})
+    first, *others = (
+        st.sensitivities(
+            base.with_({"bodies.beam1.start.0": 0.1 + offset, "bodies.beam2.start.0": offset}), paths, mu=0.3
+        ).derivative
+        for offset in (0.0, 10.0)
+    )  # fmt: skip
+    np.testing.assert_allclose(others[0], first, rtol=1e-4)
+    np.testing.assert_allclose(first[1], -first[0], rtol=1e-5)
+    lam = st.sensitivities(base, paths[:1], mu=0.3).eigenvalues
+    step = 1e-6
+    for path, at, told in ((paths[0], 0.1, first[0]), (paths[2], 0.15, first[2])):
+        low, high = (st.modes(base.with_({path: at + side}), 0.3, damped=True).eigenvalues[0] for side in (-step, step))
+        nearest = [[values[np.argmin(np.abs(values - one))] for one in lam] for values in (low, high)]
+        np.testing.assert_allclose(told, np.subtract(nearest[1], nearest[0]) / (2 * step), rtol=2e-4)
+
+
+def test_a_position_of_masses_is_measured_by_how_far_they_are_apart():
+    """A spring between two masses, one at the origin: what it does sideways is the square of its slope."""
+    text = """
+    units = "nondimensional"
+    [bodies]
+    a = {{ type = "mass", mass = 1.0, position = [{0}, {0}] }}
+    b = {{ type = "mass", mass = 1.0, position = [{1}, {2}] }}
+    [supports.a]
+    at = "a"
+    fixed = ["x", "y"]
+    [springs]
+    along = {{ between = ["a", "b"], stiffness = 4.0 }}
+    held = {{ between = ["b", "ground"], stiffness = 1.0, direction = [1.0, 0.0] }}
+    up = {{ between = ["b", "ground"], stiffness = 3.0, direction = [0.0, 1.0] }}
+    [modal]
+    max_frequency_hz = 10.0
+    """
+    found = [
+        st.sensitivities(st.loads(text.format(at, at + 3e-3, at + 4e-3)), ["bodies.b.position.0"], modes="all").derivative
+        for at in (0.0, 1.0)
+    ]
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-6)
+    # K = 4 n nᵀ + diag(1, 3) with n = (3, 4)/5, of which dn/dx = (16, −12)/25 over 5 mm.
+    n, turn = np.array([0.6, 0.8]), np.array([0.64, -0.48]) / 5e-3
+    stiffness = 4.0 * np.outer(n, n) + np.diag([1.0, 3.0])
+    squares, shapes = np.linalg.eigh(stiffness)
+    change = 4.0 * (np.outer(n, turn) + np.outer(turn, n))
+    rates = np.einsum("ik,ij,jk->k", shapes, change, shapes) / (2.0 * np.sqrt(squares))
+    assert sorted(found[0][0].imag) == pytest.approx(sorted(rates), rel=1e-6)

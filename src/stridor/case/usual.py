@@ -9,7 +9,7 @@ of their own (whole numbers, directions, factors, published values) are in `WITH
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -201,6 +201,31 @@ _ROTATION = "rotation"  # the one velocity of a support that is not in m/s
 def usual_of(table: type[BaseModel], key: str) -> Usual | None:
     """The usual size of a number of a table, sought in the tables that it extends as well."""
     return next((USUAL[name] for base in table.__mro__ if (name := f"{base.__name__}.{key}") in USUAL), None)
+
+
+def is_place(case: BaseModel, path: Sequence[str]) -> bool:
+    """Whether the number at a path is a coordinate: what it is counted from has no effect on the model."""
+    return _usual_along(case, path) is _PLACE
+
+
+def is_of_shape(case: BaseModel, path: Sequence[str]) -> bool:
+    """Whether the number at a path is a length or an angle, by which nodes lie elsewhere."""
+    found = _usual_along(case, path)
+    return found is not None and found.unit in ("m", "degrees")
+
+
+def _usual_along(case: BaseModel, path: Sequence[str]) -> Usual | None:
+    """The usual size of the number at a path; None where nothing is known of it."""
+    node: object = case
+    found: Usual | None = None
+    for key in path:
+        if isinstance(node, BaseModel):
+            found, node = usual_of(type(node), key), getattr(node, key, None)
+        elif isinstance(node, Mapping):
+            node = cast("Mapping[str, object]", node).get(key)
+        else:
+            break  # a number of a list is what the list is
+    return found
 
 
 def usual_at(table: type[BaseModel], key: str, path: str, *, area: bool = False) -> Usual | None:

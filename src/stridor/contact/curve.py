@@ -25,7 +25,7 @@ from ..mesh.model import Blocks
 from ..typing import Array, IntArray
 from . import surface
 from .kinks import lone_kinks
-from .master import Location
+from .master import CORNER_DEG, Location
 
 # Beyond an end by less than this part of a segment is still on the line.
 END_TOLERANCE = 1e-6
@@ -72,7 +72,7 @@ class Curve:
 
     @classmethod
     def from_facets(
-        cls, points: Array, facets: Blocks, *, where: str, corner_deg: float = 40.0, follows_spline: bool = False
+        cls, points: Array, facets: Blocks, *, where: str, corner_deg: float = CORNER_DEG, follows_spline: bool = False
     ) -> Curve:
         """The curve that facets "line" and "line3" of a mesh with points (·, 2) make up.
 

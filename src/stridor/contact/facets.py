@@ -29,10 +29,9 @@ from ..typing import Array, BoolArray, IntArray
 from .creases import creases
 from .facet_edges import Edges, corners_of, edges_of
 from .facet_search import EDGE_TOLERANCE, MONOMIALS, edge_coordinates, locate_all, nearest_edges, shape_of
-from .master import Location
+from .master import CORNER_DEG, Location
 
 CANDIDATES = 4
-CORNER_DEG = 40.0  # what turns by more is an edge, whatever is around
 NODE = 1e-9  # weights below are none: a point within rounding of a node is that node, as in `facet_search`
 STRAIGHT = 1e-12  # of an edge's length: what it may be bent by and be straight
 SPLITS = {

@@ -7,6 +7,8 @@ from typing import Any, Protocol
 
 from ..typing import Array, BoolArray, IntArray
 
+CORNER_DEG = 40.0 - 1e-6  # what turns by 40° or more is an edge, whatever is around: nine facets all round, to rounding
+
 
 @dataclass(frozen=True)
 class Location:

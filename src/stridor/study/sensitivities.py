@@ -15,6 +15,7 @@ from ..case import Case
 from ..case.overrides import number_at as number_of
 from ..case.overrides import split_path
 from ..case.points import choice
+from ..case.usual import is_of_shape, is_place
 from ..digits import measured
 from ..direct import Nearby
 from ..errors import AnalysisError, CaseError
@@ -44,6 +45,7 @@ from .provenance import provenance
 from .sensitivity_result import Sensitivities
 from .workspace import Problem, Workspace, different_friction, friction_in_sliding, frictions_in_sliding
 
+SHAPE_STEP = 1e-5  # of the size of bodies: by how much what says where nodes lie is moved
 NEAR = 0.05  # relative change of a number within which an exceptional point is told of
 BENT = 2.0  # condition number from which two close modes are on their way to an exceptional point
 ILL = 30.0  # condition number that is worth a sentence by itself
@@ -265,7 +267,7 @@ class Linearised:
             if compliance and not self.value(path) and step is None:
                 found = rate_from_zero(at, self._yielding(), base=self.pencil)
             else:
-                found = rate_of(at, self.value(path), step, base=self.pencil)[0]
+                found = rate_of(at, self.value(path), step or self._step(path), base=self.pencil)[0]
         except CaseError as error:
             accepted = f"a number that can be varied a little ({error.problems[0].accepted})"
             raise CaseError(path, self.value(path), accepted) from error
@@ -280,6 +282,21 @@ class Linearised:
                 "law is not in the derivative (it is at the case's own friction, without --mu)"
             )
         return found
+
+    def _step(self, path: str) -> float | None:
+        """By how much a number is moved that says where nodes lie; None for others.
+
+        A point of contact on a line of beams is on a curve whose second derivative jumps from element to element, and
+        differences about a node are of first order. How far a coordinate is from the origin says nothing.
+        """
+        steps = split_path(path)
+        if is_place(self.case, steps):
+            parts = [line.coordinates for line in self.system.lines] + [solid.points for solid in self.system.solids]
+            sizes = [np.ptp(points, axis=0).max(initial=0.0) for points in parts]
+            # Of point masses, how far they are apart.
+            size = max(sizes, default=0.0) or np.ptp([points[0] for points in parts], axis=0).max(initial=0.0)
+            return SHAPE_STEP * (float(size) or 1.0)
+        return SHAPE_STEP * (abs(self.value(path)) or 1.0) if is_of_shape(self.case, steps) else None
 
     def _yielding(self) -> float:
         """A compliance of contact [m³/N, m/N of a point] with which bodies come as near as they move in steady

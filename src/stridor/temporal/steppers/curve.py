@@ -16,7 +16,7 @@ import scipy.sparse.linalg as spl
 
 from ...contact import surface
 from ...contact.interface import Contact
-from ...errors import CaseError
+from ...errors import AnalysisError, CaseError
 from ...kernels import njit
 from ...system import System
 from ...typing import Array, IntArray
@@ -105,7 +105,7 @@ def nodes_of(segment: int, count: int) -> IntArray:
 
 def found_at(contact: Contact, u: Array, x: Array) -> Contact:
     """A contact with foot, rows and gap as they are where the structure is at u (n,) and the supports at x (p,), for
-    displacements that count from the same place; as it was where its slave is beyond an end there."""
+    displacements that count from the same place. Raises AnalysisError where its slave is beyond an end there."""
     place = contact.slave_position + contact.slave.free @ u + contact.slave.lift @ x
     line = contact.master_positions + (contact.master.free @ u + contact.master.lift @ x).reshape(-1, 2)
     at, normal, tangent = foot(), np.zeros(ROWS), np.zeros(ROWS)
@@ -115,7 +115,10 @@ def found_at(contact: Contact, u: Array, x: Array) -> Contact:
         at.nodes[:] = np.where(nodes[:, None] >= 0, line[nodes], 0.0)
         xi, on_line = project_in(segment, float(place[0]), float(place[1]), xi, contact.chords, at)
         if not on_line:
-            return contact
+            raise AnalysisError(
+                f"contact {contact.name}: in steady sliding the slave point is beyond an end of the master line; move "
+                "the slave inwards or lengthen the master"
+            )
         if not leaves(segment, xi, len(contact.chords)):
             break
         segment, xi = follow(segment, xi, contact.chords)

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spl
 
 from ...contact.interface import Contact
+from ...errors import AnalysisError
 from ...sliding import SteadySliding, steady_sliding
 from ...system import System
 from ...typing import Array
@@ -18,7 +19,8 @@ from ..settings import Settings
 from ..stepper import Disturbance
 from .curve import found_at
 
-TURNS = 8  # solutions, each on the line of the one before
+TURNS = 200  # solutions, each on the line of the one before
+SETTLED, ROUNDING = 1e-13, 1e-9  # of the displacement: what moves no further, and where it may be rounding that moves
 OVERLAP = 1e-6  # of its terms: what of a closed gap is rounding
 
 
@@ -53,22 +55,28 @@ def steady_start(system: System, stretch: Stretch) -> tuple[SteadySliding, tuple
             motion_factors=stretch.velocities_after,
         )
 
-    contacts, before = placed.contacts, np.inf
+    contacts = placed.contacts
     found = under(contacts)
     if system.load_steps or all(contact.sliding == "small" for contact in contacts):
         return found, contacts
+    moved = np.inf
     for _ in range(TURNS):
         u = found.displacement - beyond
-        # The gap is that of the displacement which carries the structure along with prescribed distances.
-        others = tuple(
+        contacts = tuple(
             own if own.sliding == "small" else found_at(own, u, stretch.distances_after) for own in placed.contacts
         )
-        again = under(tuple(_resting(*both, beyond) for both in zip(others, placed.contacts, strict=True)))
-        moved = float(np.abs(again.displacement - found.displacement).max(initial=0.0))
-        if not moved < 0.5 * before:
-            break
-        found, contacts, before = again, others, moved
-    return found, contacts
+        again = under(tuple(_resting(*both, beyond) for both in zip(contacts, placed.contacts, strict=True)))
+        size = float(np.abs(again.displacement).max(initial=0.0))
+        before, moved = moved, float(np.abs(again.displacement - found.displacement).max(initial=0.0))
+        found = again
+        if moved <= SETTLED * size or (moved <= ROUNDING * size and moved > 0.5 * before):
+            return found, contacts
+    finite = ", ".join(contact.name for contact in contacts if contact.sliding == "finite")
+    raise AnalysisError(
+        f"contact {finite}: the start in steady sliding does not settle on the line as it bends ({moved:.1e} m are "
+        f"left after {TURNS} solutions); start from rest with a ramp (temporal.initial), or take smaller loads or "
+        'sliding = "small"'
+    )
 
 
 def _resting(turned: Contact, own: Contact, beyond: Array) -> Contact:
@@ -80,18 +88,21 @@ def _resting(turned: Contact, own: Contact, beyond: Array) -> Contact:
     return replace(turned, gap=gap, normal_lift=own.normal_lift, tangent_lift=own.tangent_lift)
 
 
-def along_the_line(system: System, steady: SteadySliding, contacts: Sequence[Contact], velocities: Array) -> Array:
-    """Velocity (n,) with which a run begins so that supports' ``velocities`` (p,) neither press contacts of points that
-    slide finitely together nor part them: by impulses along their normals."""
-    rows, rates = list[Array](), list[float]()
-    for contact, active in zip(contacts, steady.active, strict=False):
-        if contact.sliding == "finite" and active and contact.compliance == 0.0:
-            rows.append(contact.normal_row)
-            rates.append(float(contact.normal_lift @ velocities))
+def along_the_line(
+    system: System, steady: SteadySliding, contacts: Sequence[Contact], velocities: Array, velocity: Array
+) -> Array:
+    """The velocity (n,) with which a run begins, so that neither it nor supports' ``velocities`` (p,) press contacts of
+    points that slide finitely together or part them: by impulses along their normals."""
+    pressed = [
+        contact for contact, active in zip(contacts, steady.active, strict=False)
+        if contact.sliding == "finite" and active and contact.compliance == 0.0
+    ]  # fmt: skip
+    rates = np.array([contact.normal_lift @ velocities + contact.normal_row @ velocity for contact in pressed])
     if not np.any(rates):
-        return np.zeros(system.size)
-    answers = np.stack([impulse(system, row) for row in rows], axis=1)
-    return np.asarray(-answers @ np.linalg.lstsq(np.stack(rows) @ answers, np.array(rates), rcond=None)[0])
+        return velocity
+    answers = np.stack([impulse(system, contact.normal_row) for contact in pressed], axis=1)
+    rows = np.stack([contact.normal_row for contact in pressed])
+    return np.asarray(velocity - answers @ np.linalg.lstsq(rows @ answers, rates, rcond=None)[0])
 
 
 def impulse(system: System, row: Array) -> Array:

@@ -28,9 +28,10 @@ def initial_state(
         stretch = schedule.stretches[0]
         steady, contacts = steady_start(system, stretch)
         state.segment[:], state.xi[:] = [c.segment for c in contacts], [c.xi for c in contacts]
-        velocity = along_the_line(system, steady, contacts, stretch.velocities_after)
-        for contact in system.contacts:
+        velocity = np.zeros(system.size)
+        for contact in contacts:
             velocity += settings.perturbation * _slip_impulse(system, contact.tangent_row)
+        velocity = along_the_line(system, steady, contacts, stretch.velocities_after, velocity)
         fields.u[:] = machine.coordinates(steady.displacement - system.motion.lift @ stretch.distances_after, modes)
         state.motion[0] = stretch.distances_after
         fields.q[:] = machine.coordinates(velocity, modes)

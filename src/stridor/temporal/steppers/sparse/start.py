@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ....contact.nodes import ContactNodes
@@ -59,10 +61,12 @@ def _steady(machine: Machine, schedule: Schedule, settings: Settings) -> tuple[A
     machine.contacts.force[:, 0] = np.where(steady.active, steady.normal_force, 0.0)
     machine.contacts.force[:, 1:] = steady.friction_force
     machine.contacts.status[:] = steady.status
-    velocity = along_the_line(system, steady, contacts, stretch.velocities_after)
+    velocity = np.zeros(system.size)
     if settings.perturbation:
-        for contact in range(len(machine.nodes.names)):
-            velocity += settings.perturbation * _slip_impulse(system, machine.nodes, contact)
+        nodes = replace(system, contacts=contacts).contact_nodes() if contacts else machine.nodes
+        for contact in range(len(nodes.names)):
+            velocity += settings.perturbation * _slip_impulse(system, nodes, contact)
+    velocity = along_the_line(system, steady, contacts, stretch.velocities_after, velocity)
     return np.asarray(steady.displacement) - system.motion.lift @ stretch.distances_after, velocity
 
 
