@@ -55,7 +55,7 @@ Mu = Annotated[
     _option(
         "--mu",
         "Friction coefficient of every contact that has friction; where several are taken, a,b or start:stop:count, "
-        "where a range is, low:high [default: the case's own; of comparisons comparison.mu, of cycles the range].",
+        "where a range is, low:high [default: the case's own; of comparisons comparison.mu].",
         metavar="MU",
         on="steady shapes modes simulate cycles compare report sensitivities countermeasures export ensemble",
         lacks="onsets=sought run=--range damping-map=sought boundary=--set reduce=--at",
