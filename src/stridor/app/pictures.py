@@ -54,8 +54,12 @@ def write_shapes(
     return documents
 
 
+def _has_places(system: System) -> bool:
+    return bool(system.solids or system.lines)
+
+
 def _require_places(system: System) -> None:
-    if not system.solids and not system.lines:
+    if not _has_places(system):
         raise CaseError(
             "bodies", None, "no places of nodes, so there is nothing to draw; bodies.NAME.mesh gives them to matrices, "
             "and `stridor modes` and `stridor report` do without"
@@ -146,7 +150,7 @@ def write_steady(problem: Problem, steady: SteadySliding, folder: Path) -> list[
 
     system = Workspace.of(problem).system()
     nodes = system.contact_nodes()
-    if not system.solids and not system.lines:
+    if not _has_places(system):
         if nodes.count:
             return []
         raise CaseError(

@@ -74,7 +74,7 @@ class Nearby:
             return found
         self.free()
         self.factorisations += 1
-        free = solver is None and VARIABLE not in os.environ
+        free = solver is None and not os.environ.get(VARIABLE)
         chosen = "superlu" if free and len(right) <= SMALL else solver
         factor = factorise(matrix, symmetric=symmetric, saddle=saddle, solver=chosen)
         found = np.asarray(factor.solve(right))

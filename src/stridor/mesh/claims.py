@@ -19,15 +19,20 @@ _VTK = re.compile(
     re.MULTILINE,
 )
 _VTU = re.compile(rb"(NumberOfPoints|NumberOfCells|NumberOfComponents)\s*=\s*[\"']\s*(\d+)")
-_VTU_CELLS = re.compile(rb"NumberOfCells\s*=\s*[\"']\s*(\d+)")
-_VTK_CELLS = re.compile(rb"^CELL_TYPES[ \t]+(\d+)", re.MULTILINE)
+_CELLS = {
+    ".vtu": re.compile(rb"NumberOfCells\s*=\s*[\"']\s*(\d+)"),
+    ".vtk": re.compile(rb"^CELL_TYPES[ \t]+(\d+)", re.MULTILINE),
+}
 _LOOKED_AT = 2**26  # bytes at each end, in which the heads are
 _TIMES = 2048  # what zlib can make of a byte, and to spare
 
 
-def check_claims(file: Path, suffix: str, where: str) -> None:
-    """Raise CaseError at ``where`` for a count of nodes, cells or values that a file of its length cannot hold, and for
-    XML that defines entities: these can stand for any amount of text."""
+def check_claims(file: Path, suffix: str, where: str) -> int | None:
+    """How many cells a VTK file says it has; None where it does not say, or says it of several pieces, and of others.
+
+    Raises CaseError at ``where`` for a count of nodes, cells or values that a file of its length cannot hold, and for
+    XML that defines entities: these can stand for any amount of text.
+    """
     size = file.stat().st_size
     with file.open("rb") as stream:
         head = stream.read(_LOOKED_AT)
@@ -48,16 +53,9 @@ def check_claims(file: Path, suffix: str, where: str) -> None:
             name = what.decode("latin-1").split()[0]
             told = f"claims {shown} at {name}, which {size_words(size)} cannot hold; is it cut short or broken?"
             raise CaseError(where, shown_path(file), told)
-
-
-def claimed_cells(file: Path, suffix: str) -> int | None:
-    """How many cells a VTK file says it has; None where it does not say, or says it of several pieces."""
-    pattern = {".vtu": _VTU_CELLS, ".vtk": _VTK_CELLS}.get(suffix)
-    if pattern is None:
-        return None
-    with file.open("rb") as stream:
-        found = pattern.findall(stream.read(_LOOKED_AT))
-    return int(found[0]) if len(found) == 1 else None
+    pattern = _CELLS.get(suffix)
+    cells = [] if pattern is None else pattern.findall(head)
+    return int(cells[0]) if len(cells) == 1 else None
 
 
 def _gmsh_claims(head: bytes) -> list[tuple[bytes, int]]:

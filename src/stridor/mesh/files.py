@@ -22,7 +22,7 @@ from ..reading import bounded
 from ..typing import IntArray
 from .abaqus import read_abaqus
 from .boundary import require_boundary as require_boundary
-from .claims import check_claims, claimed_cells
+from .claims import check_claims
 from .gather import Contents, gather
 from .gmsh_numbers import check_numbers
 from .kinds import KINDS
@@ -60,11 +60,11 @@ def read_mesh(
         with bounded():
             if suffix == ".inp":
                 return read_abaqus(file, scale=scale, group=group, where=where).mesh
-            check_claims(file, suffix, f"{where}.file")
+            claimed = check_claims(file, suffix, f"{where}.file")
             if suffix == ".msh":
                 check_numbers(file, f"{where}.file")
             raw = _through_meshio(file, suffix, f"{where}.file")
-            _require_all_cells(raw, file, suffix, f"{where}.file")
+            _require_all_cells(raw, claimed, file, f"{where}.file")
             contents = _gmsh_contents(raw) if suffix == ".msh" else _vtk_contents(raw)
             return gather(contents, source=file.name, where=where, group=group, scale=scale)
     except MemoryError as error:
@@ -101,10 +101,10 @@ def _through_meshio(file: Path, suffix: str, where: str) -> Any:
         raise CaseError(where, shown_path(file), f"is not readable as {_LOOKS[suffix]}: {reason}") from error
 
 
-def _require_all_cells(raw: Any, file: Path, suffix: str, where: str) -> None:
+def _require_all_cells(raw: Any, claimed: int | None, file: Path, where: str) -> None:
     """Raise CaseError for cells that meshio passed over: a VTK file's of a type that it does not know, or whose nodes
     are not as many as the type has."""
-    claimed, read = claimed_cells(file, suffix), sum(len(block.data) for block in raw.cells)
+    read = sum(len(block.data) for block in raw.cells)
     if claimed is not None and claimed != read:
         raise CaseError(
             where, shown_path(file),

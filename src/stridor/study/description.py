@@ -14,7 +14,8 @@ from ..case.matrix_checks import MU
 from ..case.schema import Contact, Friction, Load, Spring, TabulatedTable, Tie
 from ..case.usual import USUAL
 from ..contact.curve import Curve
-from ..contact.facets import CORNER_DEG, FacetSurface
+from ..contact.facets import FacetSurface
+from ..contact.master import CORNER_DEG
 from ..contact.rim import steps_between_pieces
 from ..errors import AnalysisError
 from ..matrices.report import LOST, NO_FRICTION

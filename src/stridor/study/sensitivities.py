@@ -296,7 +296,8 @@ class Linearised:
             # Of point masses, how far they are apart.
             size = max(sizes, default=0.0) or np.ptp([points[0] for points in parts], axis=0).max(initial=0.0)
             return SHAPE_STEP * (float(size) or 1.0)
-        return SHAPE_STEP * (abs(self.value(path)) or 1.0) if is_of_shape(self.case, steps) else None
+        shapes = steps[0] == "bodies" and is_of_shape(self.case, steps)
+        return SHAPE_STEP * (abs(self.value(path)) or 1.0) if shapes else None
 
     def _yielding(self) -> float:
         """A compliance of contact [m³/N, m/N of a point] with which bodies come as near as they move in steady
