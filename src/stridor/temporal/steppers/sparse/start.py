@@ -52,9 +52,12 @@ def _steady(machine: Machine, schedule: Schedule, settings: Settings) -> tuple[A
         ramp = stretch.ramp_steps * schedule.step
         raise CaseError("phases.0.ramp", ramp, "must be 0 when starting from steady sliding")
     steady, contacts = steady_start(system, stretch)
-    machine.contacts.segment[: len(contacts)] = [c.segment for c in contacts]
-    machine.contacts.xi[: len(contacts)] = [c.xi for c in contacts]
-    machine.set_nodes(machine.nodes, machine.turning)
+    nodes = machine.nodes
+    if any(contact.sliding == "finite" for contact in contacts):
+        machine.contacts.segment[: len(contacts)] = [c.segment for c in contacts]
+        machine.contacts.xi[: len(contacts)] = [c.xi for c in contacts]
+        machine.set_nodes(machine.nodes, machine.turning)
+        nodes = replace(system, contacts=contacts).contact_nodes()
     # The loop counts from the structure that the distances carry along.
     machine.state.motion[0] = steady.travel + stretch.distances_after
     machine.state.motion[1] = stretch.velocities_after
@@ -63,7 +66,6 @@ def _steady(machine: Machine, schedule: Schedule, settings: Settings) -> tuple[A
     machine.contacts.status[:] = steady.status
     velocity = np.zeros(system.size)
     if settings.perturbation:
-        nodes = replace(system, contacts=contacts).contact_nodes() if contacts else machine.nodes
         for contact in range(len(nodes.names)):
             velocity += settings.perturbation * _slip_impulse(system, nodes, contact)
     velocity = along_the_line(system, steady, contacts, stretch.velocities_after, velocity)
