@@ -95,12 +95,13 @@ class _Known:
 
 
 class KnownBodies:
-    """Solids of cases that differ in a few numbers, by name, and what ties them: what is the same in the next case is
-    not built again."""
+    """Solids of cases that differ in a few numbers, by name, what ties them and how their surfaces are paired: what is
+    the same in the next case is not built again."""
 
     def __init__(self) -> None:
         self._last: dict[str, _Known] = {}
         self._tied: tuple[Any, Any] | None = None
+        self._paired: dict[str, tuple[Any, Any]] = {}
 
     def tied(self, of: Any, make: Callable[[], Any]) -> Any:
         """What ties follow from: the first made, where this case's are ``of`` the same."""
@@ -108,6 +109,13 @@ class KnownBodies:
             self._tied = (of, make())
             return self._tied[1]
         return self._tied[1] if self._tied[0] == of else make()
+
+    def paired(self, name: str, of: Any, make: Callable[[], Any]) -> Any:
+        """The surfaces of a contact: the first made, where this case's follow from (``of``) the same."""
+        if name not in self._paired:
+            self._paired[name] = (of, make())
+            return self._paired[name][1]
+        return self._paired[name][1] if self._paired[name][0] == of else make()
 
     def mesh(self, name: str, body: SolidBody) -> LoadedMesh | None:
         """The mesh, if the first body of this name had it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from os import PathLike
 
 import numpy as np
@@ -30,7 +31,7 @@ from .links import Links, links_of
 from .load_steps import LoadStep
 from .model import CubicSprings, Line, Solid, System
 from .motion import FreeStructure, PrescribedMotion, constrain, distance_name
-from .pairs import is_held, is_point_on_line, point_contact, surface_contact
+from .pairs import is_held, is_point_on_line, paired_by, point_contact, surface_contact
 from .same_place import require_places_of_their_own
 from .supports import Tied, constraints_of, tie_matrix, tied_by
 from .view import View
@@ -72,7 +73,8 @@ def build_system(
         if is_point_on_line(case, contact):
             contacts.append(point_contact(case, view, name, contact))
         else:
-            surfaces.append(surface_contact(case, view, name, contact))
+            make = partial(surface_contact, case, view, name, contact)
+            surfaces.append(known.paired(name, paired_by(case, view, name, contact), make))
     require_places_of_their_own(case, bodies, lambda reference: is_held(case, view, reference))
     names = _dof_names(bodies)
     solids = tuple(

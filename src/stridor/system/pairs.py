@@ -23,11 +23,14 @@ from ..mesh.boundary import require_boundary
 from ..mesh.facets import nodal_areas, nodal_normals
 from ..mesh.model import Blocks
 from ..typing import Array, IntArray
-from .motion import distance_name
+from .motion import columns, distance_name
 from .repeats import ALIKE, Repeat, master_nodes, master_rows
+from .sameness import Itself, SameNumbers
 from .sectors import lent_repeats, require_apart_from_images, require_same_sectors
 from .seen_alike import Seen, require_seen_alike
 from .view import View, point_position
+
+OF_TABLES = ("sliding", "thickness")  # what of a body's table matters to its contacts beside the mesh
 
 
 def is_point_on_line(case: Case, contact: ContactCase) -> bool:
@@ -62,6 +65,20 @@ def point_contact(case: Case, view: View, name: str, contact: ContactCase) -> Co
             "move a body so that the slave faces the master line",
         )
     return replace(built, normal_lift=_overlapping(view, name, contact, built.normal_lift))
+
+
+def paired_by(case: Case, view: View, name: str, contact: ContactCase) -> tuple[object, ...]:
+    """All that `surface_contact` follows from, to compare with that of a like case."""
+    sides = [reference.partition(".")[0] for reference in (contact.slave, contact.master)]
+    tables = [case.bodies[side] for side in sides]
+    own = [t if isinstance(t, ObstacleBody) else [getattr(t, key, None) for key in OF_TABLES] for t in tables]
+    slave = case.location(contact.slave, where=f"contacts.{name}.slave")
+    side = case.side(name) if contact.master in case.beams else 0
+    # A body that is tied to others repeats as these do.
+    bodies = [body for at, body in view.bodies.items() if at in sides or case.ties]
+    meshes = [(body.name, body.offset, body.size, Itself(body.mesh), SameNumbers(body.points)) for body in bodies]
+    rows = SameNumbers(view.free), SameNumbers(view.motion.lift), view.motion.names, columns(view.constraints)
+    return contact, slave, side, own, meshes, rows, view.total, dict(case.ties), Itself(view.tie)
 
 
 def surface_contact(case: Case, view: View, name: str, contact: ContactCase) -> SurfaceContact:

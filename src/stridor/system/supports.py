@@ -26,6 +26,7 @@ from ..mesh.model import Blocks, Mesh
 from ..typing import Array, BoolArray, IntArray, Sparse
 from .bodies import BuiltBody
 from .motion import Constraint, columns
+from .sameness import Itself
 from .view import nearest_node
 
 _DIRECTIONS = {"x": 0, "y": 1, "z": 2}
@@ -203,21 +204,9 @@ def tied_by(case: Case, bodies: Mapping[str, BuiltBody], constraints: Sequence[C
     freedoms, and the meshes themselves, which are the same where nothing of them differs."""
     if not case.ties:
         return ()
-    meshes = tuple((name, body.offset, body.size, _Itself(body.mesh)) for name, body in bodies.items())
+    meshes = tuple((name, body.offset, body.size, Itself(body.mesh)) for name, body in bodies.items())
     boundaries = tuple(case.location(at) for tie in case.ties.values() for at in (tie.slave, tie.master))
     return dict(case.ties), boundaries, meshes, tuple(constraints)
-
-
-class _Itself:
-    """An object that is equal to itself alone, and is kept."""
-
-    def __init__(self, held: object) -> None:
-        self._held = held
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Itself) and other._held is self._held
-
-    __hash__ = None  # type: ignore[assignment]
 
 
 def _shared(matrix: Sparse, changed: IntArray) -> Sparse:

@@ -24,7 +24,7 @@ from .reduced import Reduced
 from .shifted import ForcedShapes, Shifted, frictionless_modes, modes_below, real_columns, shift_for
 
 TOLERANCE = 2e-11  # backward error at which an eigenpair counts as found: eigenvalues are right to 1e-9 then
-GROWTH = 1e-9  # and between the ends of a range, where growth must be known but onsets are solved for by themselves
+GROWTH = 1e-8  # and between the ends of a range, where growth must be known but onsets are solved for by themselves
 NAMES = 1e-7  # and where it is only which branch is which
 LARGEST_REST = 1e-4  # and what it may leave of the lumped inertia forces
 SWEEPS = 40
