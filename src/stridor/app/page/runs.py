@@ -16,8 +16,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from ...studies.processes import forked
+from .own_end import GONE, OwnEnd
 from .running import serve
-from .worker import LOADED, ended, hung_up
+from .worker import LOADED, ended
 
 AT_ONCE = max(1, (os.cpu_count() or 2) - 1)  # runs; one core is left to the pages
 PATIENCE = 0.2  # seconds that a process has to end
@@ -96,7 +97,7 @@ class Run:
         self.wish, self._heard = wish, heard
         self._queue = queue or QUEUE
         self._process: Any = None
-        self._pipe: Any = None
+        self._pipe: OwnEnd | None = None
         self._lock, self._end = threading.Lock(), threading.Lock()
         self._spoken = self.over = False
         self._queue.add(self)
@@ -116,11 +117,13 @@ class Run:
         with self._end:  # whoever waits for its end waits for a process that is on its way, too
             if self.over:
                 return
-            process, own = forked(serve, "stridor run", self.wish, loaded=LOADED)
+            process, pipe = forked(serve, "stridor run", self.wish, loaded=LOADED)
+            own = OwnEnd(pipe)
             with self._lock:
                 self._process, self._pipe = process, own
             if self.over:  # closed or stopped while it began
                 self.close()
+                own.close()
                 return
         threading.Thread(target=self._listening, args=(own,), name="stridor-run-listener", daemon=True).start()
         self.told("begun")
@@ -147,7 +150,7 @@ class Run:
         with self._lock:
             pipe, self._pipe = self._pipe, None
         if pipe is not None:
-            hung_up(pipe)
+            pipe.hang_up()
         self._queue.drop(self)
 
     def end(self) -> None:
@@ -162,17 +165,18 @@ class Run:
                 with contextlib.suppress(OSError):
                     self._pipe.send(question)
 
-    def _listening(self, pipe: Any) -> None:
+    def _listening(self, pipe: OwnEnd) -> None:
         last = ""
         while True:
             try:
                 last, content = pipe.recv()
-            except (EOFError, OSError, TypeError):  # TypeError: closed while it was being read
+            except GONE:
                 break
             self._spoken = True
             self.told(last, content)
             if last in ENDS:
                 self._ended()  # the next may begin: what is left of the process is its own end
+        pipe.close()
         if last not in ENDS:
             self.told("failed", "the process of this run has died: out of memory, or killed")
         self._ended()

@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
-import socket
 import threading
 import time
 from _thread import interrupt_main
@@ -21,6 +20,7 @@ from typing import Any
 
 from ...heap import give_back
 from ...studies.processes import forked
+from .own_end import GONE, OwnEnd
 
 PATIENCE = 0.5  # seconds that an answer may take before a newer question stops it
 IDLE = "idle"  # the part that says: what comes now is for when nobody asks
@@ -66,7 +66,7 @@ class Worker:
         self._wake = threading.Condition()
         self._closed = False
         self._process: Any = None
-        self._pipe: Any = None
+        self._pipe: OwnEnd | None = None
         self._end = threading.Lock()
         self._sender = threading.Thread(target=self._sending, name="stridor-page-sender", daemon=True)
         self._sender.start()
@@ -91,7 +91,7 @@ class Worker:
             self._wake.notify()
             pipe, self._pipe = self._pipe, None
         if pipe is not None:
-            hung_up(pipe)
+            pipe.hang_up()
 
     def end(self) -> None:
         """Wait until the process is gone, once closed; what does not end by itself is killed."""
@@ -112,20 +112,21 @@ class Worker:
             with contextlib.suppress(OSError, ValueError):  # died or closed meanwhile: the listener says so
                 pipe.send(newest)
 
-    def _started(self) -> Any:
+    def _started(self) -> OwnEnd:
         """The pipe of a new process."""
-        self._process, own = forked(_serve, "stridor page", self._program, loaded=LOADED)
-        self._pipe = own
+        self._process, pipe = forked(_serve, "stridor page", self._program, loaded=LOADED)
+        self._pipe = own = OwnEnd(pipe)
         threading.Thread(target=self._listening, args=(own,), name="stridor-page-listener", daemon=True).start()
         return own
 
-    def _listening(self, pipe: Any) -> None:
+    def _listening(self, pipe: OwnEnd) -> None:
         while True:
             try:
                 number, part, content = pipe.recv()
-            except (EOFError, OSError, TypeError):  # TypeError: closed while it was being read
+            except GONE:
                 break
             self._heard(number, part, content)
+        pipe.close()
         with self._wake:
             died = not self._closed and pipe is self._pipe
             number, again = self._number, False
@@ -138,17 +139,6 @@ class Worker:
         if died and not again:
             self._heard(number, "failed", "the process that computes for this page has died; the next change starts "
                                           "another one")  # fmt: skip
-
-
-def hung_up(pipe: Any) -> None:
-    """Close one end of a pipe. A thread that reads it at that moment keeps it open, and the other end would hear
-    nothing: sockets, which such pipes are on POSIX, are shut down first."""
-    with contextlib.suppress(OSError):
-        if os.name == "posix":
-            with socket.socket(fileno=os.dup(pipe.fileno())) as end:
-                end.shutdown(socket.SHUT_RDWR)
-    with contextlib.suppress(OSError):
-        pipe.close()
 
 
 def ended(process: Any, patience: float) -> None:
