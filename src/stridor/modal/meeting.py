@@ -18,6 +18,7 @@ from ..typing import ComplexArray
 MET = 1e-6  # of μ: how far off the real axis modes may meet that count as meeting on it
 AT_IT = 1e-5  # of μ: how near a step may end to a meeting and be said to end there
 OPPOSITE = 0.5  # of their difference: the sum of the slopes of two modes beside the place where they meet, at most
+BESIDE = 0.05  # of μ: how far off two modes meet of which the one is told as the other's partner
 FAINT = 1e-12  # of the largest coefficient: one that says nothing
 KNOWN = 1e-3  # of a step: how well the cubic knows how far off the axis its zero is
 SHORT = 1e-4  # of μ: steps in which it is known to better than MET
@@ -64,6 +65,27 @@ def beyond(
     angle = float(np.sum(np.angle((1 - zeros) / (0 - zeros))))
     going_on = before / max(abs(before), 1e-300) * np.exp(0.5j * angle)
     return Beyond(bool((after * np.conj(going_on)).real < 0), sure)
+
+
+def partner_of(values: ComplexArray, slopes: ComplexArray, i: int, mu: float) -> int:
+    """The mode, of λ (k,) and their slopes (k,) over μ, that one which begins to grow has met or passed by; itself
+    where its own conjugate is nearer than any other.
+
+    It is the one that it met near here: two such move apart with opposite slopes, as their difference squared is linear
+    in μ, and a third one that happens to lie between them does not. Where there is none, the nearest.
+    """
+    apart = values - values[i]
+    distance = np.abs(apart)
+    distance[i] = 2 * abs(values[i].imag)
+    nearest = int(np.argmin(distance))
+    if nearest == i or not np.isfinite(slopes[i]):
+        return nearest
+    with np.errstate(all="ignore"):
+        parting = slopes - slopes[i]
+        off = np.abs(apart / (2 * parting))
+        met = (np.abs(slopes + slopes[i]) <= OPPOSITE * np.abs(parting)) & (off <= BESIDE * mu)
+    met[i] = False
+    return int(np.argmin(np.where(met, distance, np.inf))) if met.any() else nearest
 
 
 def halves(first: complex, second: complex) -> tuple[complex, complex]:

@@ -19,6 +19,7 @@ from .backward_error import BackwardError
 from .coupling import PointCoupling
 from .full.family import Family
 from .histories import Entries, StabilityChange, imbalance, once_each, reported, unexplained
+from .meeting import partner_of
 from .newton import Root, crossing, exceptional, meeting, standstill
 from .onset import Branches, Onset, Onsets
 from .options import Options
@@ -225,7 +226,7 @@ def _passages(old: RootState, new: RootState, has_damping: bool) -> list[_Event]
                         mu,
                         a + fraction * (b - a),
                         int(new.branch[i]),
-                        _named(new, _nearest(new.roots, i, b)),
+                        -1 if (j := partner_of(new.roots, new.tangents, i, new.mu)) == i else _named(new, j),
                         stabilising,
                         False,
                         i,
@@ -257,14 +258,6 @@ def _grows(root: complex) -> bool:
 
 def _named(state: RootState, i: int) -> int:
     return int(state.branch[i]) if i >= 0 else -1
-
-
-def _nearest(roots: ComplexArray, i: int, root: complex) -> int:
-    distance = np.abs(roots - root)
-    distance[i] = np.inf
-    j = int(np.argmin(distance)) if len(roots) > 1 else i
-    # A root nearer to its own conjugate than to any other diverges rather than flutters.
-    return -1 if 2 * abs(root.imag) < distance[j] else j
 
 
 def _partner(old: RootState, new: RootState, i: int) -> int:

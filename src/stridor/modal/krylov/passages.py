@@ -11,6 +11,7 @@ import numpy as np
 
 from ...typing import Array, BoolArray, ComplexArray
 from ..dense_problem import OverNumber
+from ..meeting import partner_of
 from ..tolerances import SPLIT_RELATIVE
 from .follow import COINCIDENT, BranchState, halves
 from .undamped import COMPLEX, Squares, mirrored, on_axis, rounding, squared, squares_of, undamped
@@ -69,11 +70,12 @@ def crossings(old: BranchState, new: BranchState) -> list[Passage]:
         marks = [0.0, *_turns(start, end, *slopes), 1.0]
         rates = [_cubic(start, end, *slopes, mark) for mark in marks]
         passed = [k for k in range(len(marks) - 1) if rates[k] * rates[k + 1] < 0]
+        partner = partner_of(new.values, new.tangents, i, new.mu) if passed else i
         for k in passed:
             # One that is alone lies somewhere in the step: where the cubic turns is not known to the last.
             a, b = (0.0, 1.0) if len(passed) == 1 else (marks[k], marks[k + 1])
             low, high = old.mu + a * step, old.mu + b * step
-            found.append(Passage("crossing", low, high, i, _neighbour(new, i), bool(rates[k] > 0), (0j, 0j), old))
+            found.append(Passage("crossing", low, high, i, partner, bool(rates[k] > 0), (0j, 0j), old))
     return found
 
 
@@ -104,13 +106,6 @@ def _cubic(start: float, end: float, first: float, second: float, at: float) -> 
     c3 = 2 * start - 2 * end + first + second
     c2 = -3 * start + 3 * end - 2 * first - second
     return start + at * (first + at * (c2 + at * c3)) if 0 < at < 1 else (end if at else start)
-
-
-def _neighbour(state: BranchState, i: int) -> int:
-    """The branch nearest to branch i; itself where its own conjugate is nearer."""
-    distance = np.abs(state.values - state.values[i])
-    distance[i] = 2 * abs(state.values[i].imag)
-    return int(np.argmin(distance))
 
 
 def meetings(source: OverNumber, old: BranchState, new: BranchState, among: BoolArray | None = None) -> list[Passage]:
