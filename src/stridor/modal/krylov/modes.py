@@ -23,12 +23,13 @@ from .carried import Carried
 from .follow import Follower
 from .problem import problem_of
 from .reduced import Reduced
-from .refine import GROWTH, GUARD, MARGIN, NAMES, Band, converge_at, converge_over, left_vectors, projected
+from .refine import GUARD, MARGIN, NAMES, Band, converge_at, converge_over, left_vectors, projected
 
 _log = logging.getLogger("stridor")
 
 SAMPLES = 7  # from no friction on
 FEWEST = 3
+HANDED = 1e-9  # backward error of modes on a basis that was handed on
 SAME = 1e-6  # of an eigenvalue: a left vector solved for belongs to it
 
 
@@ -77,7 +78,7 @@ def krylov_modes(
         frictions = numbered_at + samples(top - numbered_at, count)
         converge_over(reduced, frictions, between=NAMES, left=left, inner=inner)
         # A basis that was handed on has been nowhere near some of these μ.
-        to = BELIEVED if handed is None else GROWTH
+        to = BELIEVED if handed is None else HANDED
         done, _, planned = at_each(
             values, lambda at: converge_at(reduced, [at], tolerance=to, left=left), progress
         )
