@@ -91,6 +91,15 @@ def test_the_parameter_mu_is_friction(tmp_path: Path) -> None:
     assert np.all(found.derivative[0] == found.derivative[1])
 
 
+def test_a_parameter_may_be_called_by_its_name(tmp_path: Path) -> None:
+    case = turning(tmp_path)
+    short, long = (st.sensitivities(case, [name], modes="all") for name in ("Omega", "parameters.Omega.value"))
+    assert short.parameters == long.parameters
+    assert np.all(short.derivative == long.derivative)
+    (measure,) = st.rank_countermeasures(case, mu=1.0, percent=0.1, verify=0, numbers="Omega").measures
+    assert measure.name == "parameters.Omega.value"
+
+
 def test_the_bench_as_matrices_answers_as_the_bench(tmp_path: Path) -> None:
     case = st.loads(template_text("two-beams"), FEW)
     written = st.export(case, tmp_path, format="npz")

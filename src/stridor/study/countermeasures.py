@@ -22,7 +22,7 @@ from .measure_ranking import Ranking, edges_of
 from .measure_verification import verified
 from .measures import Countermeasures, Measure, Target, Verified
 from .provenance import provenance
-from .sensitivities import Linearised
+from .sensitivities import Linearised, numbers_of
 from .workspace import Problem, Workspace
 
 WHOLE = 0.5  # of all freedoms: a matrix that reaches over more is that of the whole model
@@ -98,7 +98,8 @@ def rank_countermeasures(
         columns = linear.modes.branch[ranking.columns]
         return Countermeasures(linear.mu, target, columns, ranking.eigenvalues, (), margin, told, source)
     left = whole_matrices(case, linear.mu) if numbers is None else []
-    found = ranking.numbers(default_numbers(case, left) if numbers is None else names_of(numbers, "numbers", none=True))
+    asked = default_numbers(case, left) if numbers is None else names_of(numbers, "numbers", none=True)
+    found = ranking.numbers(numbers_of(case, asked))
     if added_mass:
         found += ranking.masses()
     if edges:

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 
 from ..asking import SWITCH_OR_NONE, TABLE, takes
 from ..case import Case
+from ..case.matrix_checks import MU
 from ..case.overrides import number_at as number_of
 from ..case.overrides import split_path
 from ..case.points import choice
@@ -75,7 +76,8 @@ def sensitivities(
     "mu" is the friction coefficient of every contact and in the factors of imported matrices,
     "contacts.NAME.friction.coefficient" that of one contact; "contacts.NAME.compliance" is 1/K_c, which rigid contact
     has too. Every other path is a number of the case, such as "materials.iron.density", "bodies.pad.thickness" or
-    "bodies.brake.terms.1.factor"; settings of analyses, such as modal.max_frequency_hz, are none of the model.
+    "bodies.brake.terms.1.factor", or the name of one of its [parameters]; settings of analyses, such as
+    modal.max_frequency_hz, are none of the model.
 
     mu: the friction coefficient (default: the case's own).
 
@@ -92,6 +94,7 @@ def sensitivities(
     started, parameters = time.perf_counter(), names_of(parameters, "parameters")
     work = Workspace.of(problem)
     linear = Linearised.of(work, mu, count=count, max_frequency_hz=max_frequency_hz, damped=damped)
+    parameters = numbers_of(linear.case, parameters)
     values = np.array([linear.value(path) for path in parameters])
     changes = [linear.change(path, (steps or {}).get(path)) for path in parameters]
     linear.warnings += [
@@ -418,6 +421,11 @@ class Linearised:
         found = self.mode(column)
         assert found is not None, "asked for after `mode` said so"
         return found
+
+
+def numbers_of(case: Case, names: Sequence[str]) -> tuple[str, ...]:
+    """Paths of numbers, of which parameters may be called by their names alone."""
+    return tuple(f"parameters.{n}.value" if n in case.parameters and n != MU else n for n in names)
 
 
 def _contact_of(case: Case, path: str) -> str | None:
