@@ -44,13 +44,16 @@ def bent_gap(cosine: float, tilted: float, bend: float, height: float) -> float:
 class Turning:
     """Of m nodes: how their normals turn along the tangents as they slide along these, rate K (m, d−1, d−1) [rad/m],
     and how far along them (m, d−1) [m] they were; tilt (m (d−1), n) csr and tilt_lift (m (d−1), p): rows A of the
-    master's tilt under the nodes along the tangents, and tilted (m, d−1) [rad] what they were."""
+    master's tilt under the nodes along the tangents, and tilted (m, d−1) [rad] what they were. drift (m (d−1), p): what
+    the nodes' tangent_lift has of material that slides through its mesh, which takes none of them anywhere; None for
+    none."""
 
     rate: Array
     place: Array
     tilt: Sparse
     tilt_lift: Array
     tilted: Array
+    drift: Array | None = None
 
     @staticmethod
     def none(nodes: ContactNodes) -> Turning:
@@ -69,10 +72,14 @@ class Turning:
         """Tilt (m, d−1) of a structure at u (n,) and supports at x (p,), or its rate at their velocities."""
         return np.asarray(self.tilt @ u + self.tilt_lift @ x).reshape(self.place.shape)
 
+    def way_lift(self, nodes: ContactNodes) -> Array:
+        """What supports take the nodes along their tangents (m (d−1), p)."""
+        return nodes.tangent_lift if self.drift is None else nodes.tangent_lift - self.drift
+
     def gap(self, nodes: ContactNodes, u: Array, x: Array) -> Array:
         """Gaps (m,) [m] of these nodes where the structure is at u (n,) and the supports at x (p,)."""
         height = nodes.gap + nodes.normal @ u + nodes.normal_lift @ x
-        way = (nodes.tangent @ u + nodes.tangent_lift @ x).reshape(self.place.shape) - self.place
+        way = (nodes.tangent @ u + self.way_lift(nodes) @ x).reshape(self.place.shape) - self.place
         tilt = self.tilts(u, x) - self.tilted
         angle = tilt + np.einsum("mjk,mk->mj", self.rate, way)
         cosine, tilted = (
@@ -85,6 +92,8 @@ class Bends(NamedTuple):
     """The k nodes whose normals turn, node (k,) their places in the table, with rate (k, d−1, d−1), place and tilted
     (k, d−1); and the table's numbers as they were found, in w rows: normal and tangents, and where a master can tilt
     the d − 1 rows A of its tilt, w = d or 2d − 1: row and push (entries, w), lift (m, w, p), gap (m,), block (m, w, w).
+    drift (m, d−1, p): what slips along the tangents have beside, wherever these turn to.
+
     turn (k, d, w): what normal and tangents at the beginning of a step have of these rows."""
 
     node: IntArray
@@ -97,6 +106,7 @@ class Bends(NamedTuple):
     lift: Array
     gap: Array
     block: Array
+    drift: Array
 
 
 def bends_of(
@@ -104,9 +114,16 @@ def bends_of(
 ) -> Bends:
     """Those of a table, from its numbers in w rows; without copies where no node turns."""
     turns = np.flatnonzero(np.any(turning.rate, axis=(1, 2)) | turning.tilting)
-    kept = [part.copy() if len(turns) else part[:0].copy() for part in (row, push, lift, gap, block)]
+    row, push, lift, gap, block = (
+        part.copy() if len(turns) else part[:0].copy() for part in (row, push, lift, gap, block)
+    )
     rate, place, tilted = (
         np.ascontiguousarray(part[turns]) for part in (turning.rate, turning.place, turning.tilted)
     )
     d, w = turning.rate.shape[1] + 1, row.shape[1]
-    return Bends(turns.astype(np.int64), np.zeros((len(turns), d, w)), rate, place, tilted, *kept)
+    drift = np.zeros((len(lift), d - 1, lift.shape[2]))
+    if turning.drift is not None and len(turns):
+        drift[:] = turning.drift.reshape(drift.shape)
+        lift[:, 1:d] -= drift
+    turn = np.zeros((len(turns), d, w))
+    return Bends(turns.astype(np.int64), turn, rate, place, tilted, row, push, lift, gap, block, drift)

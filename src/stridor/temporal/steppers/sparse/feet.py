@@ -201,6 +201,8 @@ def _turn_rows(i: int, turn: Array, table: NodeTable) -> None:  # pragma: no cov
             table.lift[i, j, p] = 0.0
             for o in range(turn.shape[1]):
                 table.lift[i, j, p] += turn[j, o] * bends.lift[i, o, p]
+            if j > 0:  # material slides along the surface as that lies now
+                table.lift[i, j, p] += bends.drift[i, j - 1, p]
 
 
 @njit(cache=True, allocates=False)

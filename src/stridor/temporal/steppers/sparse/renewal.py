@@ -66,18 +66,18 @@ def _displaced(machine: Machine, surface: SurfaceContact) -> tuple[Array, Array]
 
 def turning(machine: Machine, surfaces: tuple[SurfaceContact, ...], nodes: ContactNodes, distances: Array) -> Turning:
     """How the normals of nodes just found turn as these slide on, and as the master turns: by its normals, and by its
-    displacements, a little further on along each tangent. Nodes of bodies whose material slides through their mesh stay
-    where they are; so do their normals."""
-    found = Turning.none(nodes)
+    displacements, a little further on along each tangent. Material that slides through its mesh takes no node along."""
+    drift = _drift(machine, surfaces, nodes)
+    found = replace(Turning.none(nodes), drift=drift if np.any(drift) else None)
     u, x = machine.displacement, machine.state.motion[0]
-    found.place[:] = (nodes.tangent @ u + nodes.tangent_lift @ x).reshape(found.place.shape)
+    found.place[:] = (nodes.tangent @ u + found.way_lift(nodes) @ x).reshape(found.place.shape)
     first = len(machine.system.contacts)
     free = [sp.csr_array((nodes.directions * first, found.tilt.shape[1]))]
     for k, surface in enumerate(surfaces):
         own = slice(first, first + surface.nodes.count)
         first = own.stop
         tilt = sp.csr_array((nodes.directions * surface.nodes.count, found.tilt.shape[1]))
-        if surface.sliding == "finite" and not np.any(surface.drift):
+        if surface.sliding == "finite":
             found.rate[own], tilt, found.tilt_lift.reshape(*found.place.shape, -1)[own] = _turning_of(
                 surface, *_displaced(machine, surface), nodes.tangents[own], PROBE * distances[k]
             )
@@ -85,6 +85,22 @@ def turning(machine: Machine, surfaces: tuple[SurfaceContact, ...], nodes: Conta
     found = replace(found, tilt=sp.csr_array(sp.vstack(free)))
     found.tilted[:] = found.tilts(u, x)
     return found
+
+
+def _drift(machine: Machine, surfaces: tuple[SurfaceContact, ...], nodes: ContactNodes) -> Array:
+    """What tangent_lift (m (d−1), p) has of material that slides through its mesh."""
+    t = nodes.directions
+    found = np.zeros((nodes.count, t, nodes.tangent_lift.shape[1]))
+    first = len(machine.system.contacts)
+    for surface in surfaces:
+        own = slice(first, first + surface.nodes.count)
+        first = own.stop
+        if np.any(surface.drift):
+            # Of nodes that are one, images slide as each other (`pairs`).
+            tangents = nodes.tangents[own]
+            apart = tangents if surface.joined is None else surface.joined.tangents(tangents[surface.joined.into])
+            found[own] = np.einsum("mqd,mdp->mqp", apart, surface.drift)[surface.first]
+    return found.reshape(nodes.tangent_lift.shape)
 
 
 def _turning_of(
@@ -202,7 +218,7 @@ def fading(machine: Machine, facets: Array) -> float:
     facets (k,) [m]), and over no fewer than a hundred steps. Over steps alone they would follow the polygon of linear
     facets ever more closely the shorter the step, each of whose edges is a blow; where no master is meshed there is
     none, and a hundred steps serve."""
-    speed, points = np.linalg.norm(_slip(machine), axis=1), len(machine.system.contacts)
+    speed, points = np.linalg.norm(_way_rate(machine), axis=1), len(machine.system.contacts)
     ways: list[float] = []
     for k, surface in enumerate(machine.system.surfaces):
         if surface.sliding == "finite" and np.isfinite(facets[k]):
@@ -211,16 +227,18 @@ def fading(machine: Machine, facets: Array) -> float:
     return 1.0 - min(1.0 / OFFSET_STEPS, max(ways, default=1.0))
 
 
-def _slip(machine: Machine) -> Array:
-    """Slip velocities (m, d−1) [m/s] of all nodes."""
+def _way_rate(machine: Machine) -> Array:
+    """How fast (m, d−1) [m/s] all nodes move over their masters: slip velocities but for material that slides through
+    its mesh, which takes them nowhere."""
     nodes, q = machine.nodes, machine.fields.q[machine.layout.index]
-    return np.asarray(nodes.tangent @ q + nodes.tangent_lift @ machine.state.motion[1]).reshape(nodes.count, -1)
+    along = nodes.tangent @ q + machine.turning.way_lift(nodes) @ machine.state.motion[1]
+    return np.asarray(along).reshape(nodes.count, -1)
 
 
 def steps_to_renewal(machine: Machine, distances: Array, last: int) -> int:
     """Steps until a node of a finitely sliding surface has slid far enough at its present speed, or its normal turned;
     at most twice as many as the ``last`` time, for what starts from rest does not stay at its speed."""
-    nodes, slip = machine.nodes, _slip(machine)
+    nodes, slip = machine.nodes, _way_rate(machine)
     speed = np.linalg.norm(slip, axis=1)
     tilts = machine.turning.tilts(machine.fields.q[machine.layout.index], machine.state.motion[1])
     turned = np.linalg.norm(np.einsum("mjk,mk->mj", machine.turning.rate, slip) + tilts, axis=1)
