@@ -412,3 +412,30 @@ def test_other_sets_in_equilibrium_are_named() -> None:
             assert named["normal_force"] == pytest.approx(force, rel=1e-9)
         several += len(told)
     assert several > 3
+
+
+# -- contacts that harden, with much friction: no equilibrium of one set of nodes says nothing of the others ------------
+def test_a_set_that_newton_does_not_settle_on_is_not_the_last_word() -> None:
+    """With both contacts closed friction pulls them ever harder together; with one of them open there is an
+    equilibrium."""
+    normal = np.array([[-0.877, 0.714], [-1.697, 0.908]])
+    tangent, slip, mu = np.array([[-0.112, 1.857], [0.279, -0.143]]), (0.5363, -0.4174), 0.9036
+    stiffness, contact, cubic = np.array([[3.507, 0.035], [0.035, 3.531]]), (13.051, 10.315), (12.098, 3.195)
+    load = np.array([1.848, -1.257])
+    system = st.System.from_matrices(
+        np.eye(2), 0.1 * np.eye(2), stiffness, loads={"f": load},
+        contacts={
+            f"c{k}": {
+                "normal": normal[k], "tangent": tangent[k], "stiffness": contact[k], "slip": slip[k], "cubic": cubic[k],
+                "friction": {"law": "coulomb", "coefficient": mu},
+            }
+            for k in range(2)
+        },
+    )  # fmt: skip
+    found = st.steady_sliding(system, mu)
+    force, u = found.normal_force, found.displacement
+    approach = np.maximum(-normal @ u, 0.0)
+    assert force == pytest.approx(contact * approach + cubic * approach**3, rel=1e-9)
+    assert list(force > 0.0) == [True, False]
+    push = normal - mu * np.sign(slip)[:, None] * tangent
+    assert stiffness @ u == pytest.approx(load + push.T @ force, rel=1e-9)

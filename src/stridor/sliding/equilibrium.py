@@ -59,6 +59,10 @@ class NodeEquilibrium:
     residual: float | None = None
 
 
+class NoConvergence(AnalysisError):
+    """Newton's method on springs beyond the linear does not settle for a set of touching nodes."""
+
+
 class Equilibrium:
     """K u + cubic(u) − Pᵀ N = f,  g₀ + n u + c N = 0 on the touching nodes, with P = n + μ s·t.
 
@@ -108,7 +112,7 @@ class Equilibrium:
         """The equilibrium with exactly these nodes touching, whichever the signs of gap and force.
 
         start (n,): where Newton's method begins for springs beyond the linear. Raises direct.SingularMatrix where the
-        structure can move, AnalysisError where Newton's method does not converge.
+        structure can move, NoConvergence where Newton's method does not converge.
         """
         u = np.zeros(self.system.size) if start is None else start
         nodes, cubic = self.nodes, self.system.cubic
@@ -125,9 +129,14 @@ class Equilibrium:
             u, normal = self._linear(active, tangent, extra)
             if self._converged(before, u, active):
                 return NodeEquilibrium(active, u, normal, nodes.gap + self._rows @ u)
-        raise AnalysisError(
-            "steady sliding: the springs beyond the linear find no equilibrium in "
-            f"{NEWTON_STEPS} steps; check their coefficients (softening springs may have none)"
+        if start is not None:
+            return self.solve(active)  # from where nothing is strained
+        softens = springs and cubic is not None and bool(np.any(cubic.coefficient < 0.0))
+        hint = "check their coefficients (softening springs may have none)" if softens else (
+            "take smaller loads or a lower friction coefficient"
+        )
+        raise NoConvergence(
+            f"steady sliding: the springs beyond the linear find no equilibrium in {NEWTON_STEPS} steps; {hint}"
         )
 
     def _open(self) -> tuple[Array, Array]:
@@ -302,6 +311,7 @@ def find_touching(
     kept: BoolArray = movable & nodes.kept
     active: BoolArray = movable if guess is None else movable & (guess | kept)
     last: NodeEquilibrium | None = None
+    unsolved: NoConvergence | None = None
     seen: set[bytes] = set()
     care = 0
     for step in range(1, limit + 1):
@@ -319,6 +329,9 @@ def find_touching(
             active[back] = True
             care = max(care, 2)
             continue
+        except NoConvergence as error:  # other sets may have an equilibrium
+            unsolved = error
+            break
         pulled, closing = offenders(state, movable, load)
         pulled = pulled[~kept[pulled]]
         if not len(pulled) and not len(closing):
@@ -332,6 +345,8 @@ def find_touching(
             active = changed(state.active, pulled, closing, care)
     if (found := next(of_every_set(equilibrium), None)) is not None:
         return found, limit
+    if unsolved is not None:
+        raise unsolved
     raise AnalysisError(f"steady sliding{at}: {unsettled(int(np.count_nonzero(movable & ~kept)), limit)}")
 
 
@@ -347,7 +362,7 @@ def of_every_set(equilibrium: Equilibrium) -> Iterator[NodeEquilibrium]:
     for active in sets_near(movable, free):
         try:
             state = equilibrium.solve(active)
-        except direct.SingularMatrix:
+        except (direct.SingularMatrix, NoConvergence):
             continue
         pulled, closing = offenders(state, movable, load)
         if nodes.kept[pulled].all() and not len(closing):
