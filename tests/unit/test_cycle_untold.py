@@ -25,7 +25,7 @@ def cycle(method: str, harmonics: int, stick: float) -> Cycle:
 @pytest.mark.parametrize(
     ("method", "harmonics", "stick", "share", "said"),
     [
-        ("harmonic", 16, 0.0, 1 / 16, "; sticks shorter than 6.2 % of a period are not told (harmonic balance)"),
+        ("harmonic", 16, 0.0, 1 / 16, "; sticks shorter than about 6.2 % of a period are not told (harmonic balance)"),
         ("harmonic", 16, 0.3, 1 / 16, ""),
         ("shooting", 0, 0.0, None, ""),
     ],

@@ -186,7 +186,7 @@ def test_a_branch_in_harmonics(slow_belt: Cycles):
     without = [c for c in slow_belt.cycles if c.shares[0, 1] == 0.0]
     assert without[0].untold_share == 1 / without[0].harmonics == without[0].to_json()["untold_share"]
     longest = 100 * max(c.untold_share for c in without)
-    assert slow_belt.sentence.endswith(f"; sticks shorter than {longest:.2g} % of a period are not told (harmonic balance)")
+    assert slow_belt.sentence.endswith(f"; sticks shorter than about {longest:.2g} % of a period are not told (harmonic balance)")
     assert reversal.sentence.startswith(
         f"reversal of slip of 1/{reversal.harmonics} of the period, which {reversal.harmonics} harmonics tell, begins between"
     )

@@ -99,7 +99,7 @@ class Cycles(Tabular):
         shares = [c.untold_share for c in self.cycles if c.untold_share and not np.all(c.shares[:, 1] > 0.0)]
         if not shares:
             return ""
-        return f"; sticks shorter than {100 * max(shares):.2g} % of a period are not told (harmonic balance)"
+        return f"; sticks shorter than about {100 * max(shares):.2g} % of a period are not told (harmonic balance)"
 
     @property
     def warnings(self) -> tuple[str, ...]:
