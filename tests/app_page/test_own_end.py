@@ -32,14 +32,14 @@ def test_a_pipe_that_is_hung_up_keeps_its_number_until_its_reader_has_heard(tmp_
         theirs.recv()
     with (tmp_path / "other").open("wb") as other:  # which would have the number of a closed pipe
         assert other.fileno() != number
-        with pytest.raises(OSError):
+        with pytest.raises((BrokenPipeError, ConnectionResetError)):
             end.send("what a file must not get")
         go_on.set()
         reader.join(10.0)
     assert (tmp_path / "other").read_bytes() == b""
-    with pytest.raises(OSError):
+    with pytest.raises(OSError, match="Bad file descriptor"):
         os.fstat(number)
-    with pytest.raises(OSError):
+    with pytest.raises((BrokenPipeError, ConnectionResetError)):
         end.send("nobody is there")
     end.hang_up()  # and again, which does nothing
     end.close()
@@ -50,7 +50,7 @@ def test_who_hangs_up_does_not_wait_for_one_that_writes():
     end, failed = OwnEnd(ours), threading.Event()
 
     def writing() -> None:
-        with pytest.raises(OSError):
+        with pytest.raises((BrokenPipeError, ConnectionResetError)):
             end.send(b"x" * 10_000_000)  # more than the pipe holds, and nobody reads
         failed.set()
 
