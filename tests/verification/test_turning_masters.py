@@ -354,3 +354,92 @@ def test_a_restart_on_sliding_material_goes_on_as_before(part):
     again = simulate_assembled(system, one_phase(0.02, velocities=motion), settings, restart=first)
     assert np.array_equal(again.normal_force, whole.normal_force)
     assert np.array_equal(again.displacement, whole.displacement)
+
+
+def test_a_bead_is_dragged_along_until_it_turns_with_the_drum():
+    """Without weight: m R φ̈ = μ m R φ̇², φ = −ln(1 − μ φ̇₀ t)/μ up to φ̇ = Ω. With the velocity of the material where
+    the bead began it turned round at a quarter of a turn."""
+    case = st.loads("""
+        units = "nondimensional"
+        bodies.bead = { type = "mass", mass = 1.0, position = [0.0, 0.0], initial_velocity = [1.0, 0.0] }
+        temporal = { step = 1e-3, record_every = 10, watch = ["bead"] }
+        modal.max_frequency_hz = 0.5
+        phases = [{ name = "run", duration = 3.0 }]
+        [bodies.drum]
+        type = "obstacle"
+        shape = "cylinder"
+        point = [0.0, 1.0]
+        radius = 1.0
+        inside = true
+        sliding = { spin = 2.0, centre = [0.0, 1.0] }
+        [contacts.rub]
+        slave = "bead"
+        master = "drum"
+        stiffness = "rigid"
+        sliding = "finite"
+        friction = { law = "coulomb", coefficient = 0.3 }
+    """)
+    found = st.simulate(case)
+    angle = np.unwrap(np.arctan2(found.displacement[:, 0, 0], 1.0 - found.displacement[:, 0, 1]))
+    mu, spin = 0.3, 2.0
+    together = (1.0 - 1.0 / spin) / mu  # when φ̇ = φ̇₀/(1 − μ φ̇₀ t) is Ω
+    true = np.where(
+        found.time < together, -np.log(np.maximum(1.0 - mu * found.time, 1.0 / spin)) / mu,
+        np.log(spin) / mu + spin * (found.time - together),
+    )  # fmt: skip
+    np.testing.assert_allclose(angle, true, rtol=0.0, atol=1e-4)
+    assert angle[-1] > 4.5
+
+
+TURNS, RUBS = 3.0, 0.2  # rad/s, of a turntable; its friction
+
+
+def on_a_turntable(**other):
+    """x (2,) of a bead on a turntable over time: ẍ = μ g w/|w| with w = Ω × (x − u) + u̇ − ẋ, u (2,) where its axis is."""
+    axis = other.get("axis", np.zeros(2))
+
+    def rates(t, y):
+        x, v = y[:2] - axis * t, y[2:] - axis
+        slip = TURNS * np.array([-x[1], x[0]]) - v
+        return np.append(y[2:], RUBS * GRAVITY * slip / np.linalg.norm(slip))
+
+    return scipy.integrate.solve_ivp(
+        rates, (0.0, 0.12), [0.05, -0.03, 1.0, 0.4], rtol=1e-10, atol=1e-11, dense_output=True
+    ).sol  # fmt: skip
+
+
+def turntable(axis):
+    """A bead on a plate of facets whose material turns about the middle, and which a support moves by ``axis`` [m/s]."""
+    system = rocking(3, friction=RUBS, swing=0.0)
+    (contact,) = system.surfaces
+    bead, none = Rows(sp.csr_array(sp.eye_array(3)), np.zeros((3, 2))), np.zeros((3, 2))
+    lift = np.zeros((contact.master_rows.free.shape[0], 2))
+    lift[0::3, 1], lift[1::3, 1] = axis
+    turn, drift = np.zeros((3, 3, 2)), np.zeros((1, 3, 2))
+    turn[:2, :2, 0] = TURNS * np.array([[0.0, -1.0], [1.0, 0.0]])
+    drift[0, :, 0] = -turn[:, :, 0] @ contact.slave_position[0]
+    moved = pair_surface(
+        "plate", where="contacts.plate", slave=bead, slave_position=contact.slave_position,
+        slave_normals=np.zeros((1, 3)), area=contact.area, master=contact.master, drift=drift, turn=turn, law=contact.law,
+        master_rows=Rows(sp.csr_array((len(lift), 3)), lift), stiffness_per_area=np.inf, sliding="finite", adjust=True,
+    )  # fmt: skip
+    own = np.zeros((2, 2))
+    return System(
+        np.eye(3), np.zeros((3, 3)), np.zeros((3, 3)), (), {"weight": np.array([0.0, 0.0, -GRAVITY])}, surfaces=(moved,),
+        points={"bead": bead}, dimension=3, initial_velocity=np.array([1.0, 0.4, 0.0]),
+        motion=PrescribedMotion(("spin", "way"), none, none, none, own, own, own),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0), (0.3, -0.2)])
+def test_friction_on_a_turntable_is_that_of_the_place_where_a_bead_is(axis):
+    """Also where the turntable itself is moved: what counts is the place on it."""
+    way = on_a_turntable(axis=np.array(axis))
+    motion = {"spin": 1.0, "way": 1.0}
+    settings = Settings(step=1e-4, record_every=10, watch=("bead",))
+    found = simulate_assembled(turntable(axis), one_phase(0.12, velocities=motion), settings)
+    true = np.array([way(t)[:2] for t in found.time]) - START
+    np.testing.assert_allclose(found.displacement[:, 0, :2], true, rtol=0.0, atol=2e-4 * np.abs(true).max())
+    first = simulate_assembled(turntable(axis), one_phase(0.0601, velocities=motion), settings)
+    again = simulate_assembled(turntable(axis), one_phase(0.12, velocities=motion), settings, restart=first)
+    assert np.array_equal(again.displacement, found.displacement)

@@ -14,7 +14,7 @@ from ..laws.friction import FrictionLaw
 from ..mesh.facets import facet_normals
 from ..mesh.model import Blocks
 from ..typing import Array, BoolArray, IntArray
-from .coupling import SlaveFacets, coupled
+from .coupling import SlaveFacets, coupled, point_weights
 from .curve import Curve
 from .facets import FacetSurface
 from .interface import Rows, rounding_of, without_rounding
@@ -47,6 +47,7 @@ def pair_surface(
     thickness: float = 1.0,
     freedoms: IntArray | None = None,
     repeats: Sequence[Bond] = (),
+    turn: Array | None = None,
 ) -> SurfaceContact:
     """A surface contact of those slave nodes that the undisplaced master faces.
 
@@ -63,7 +64,7 @@ def pair_surface(
     facets: those between the slave nodes, by kind; in the plane of a ``thickness`` [m]. With them contacts of
     quadratic facets are weighted over facets (`coupling`), which also says what area a node stands for; without, each
     node stands by itself. freedoms (m, d) of the slave nodes' displacements, and the bonds by which bodies repeat:
-    slave nodes that these make one are one node of the contact (`joined`).
+    slave nodes that these make one are one node of the contact (`joined`). turn: that of `SurfaceContact`.
 
     Raises CaseError naming ``where`` when no node faces the master, or when nodes overlap it by more than that.
     """
@@ -131,6 +132,7 @@ def pair_surface(
         nodes=nodes,
         facets=around,
         joined=one,
+        turn=turn,
     )
 
 
@@ -215,7 +217,8 @@ def repair(
 
     Nodes (q,) that have left over an edge stay in the list, on the nearest point of that edge, so that m does not
     change; the caller has to hold them open. Nodes of facets that hung over an edge at the start have left when nothing
-    of those is above the master any more. Drift is kept node by node, and so are areas.
+    of those is above the master any more. Areas are kept node by node; the drift is that of the place on the master
+    where each node is now.
     """
     location = contact.master.locate(
         contact.slave_position + slave_displacement, master_displacement, guess=contact.location.facet
@@ -231,6 +234,9 @@ def repair(
         contact.master,
         master_displacement,
     )
+    if contact.turn is not None:
+        carried = point_weights(location, contact.master.node_count) @ master_displacement
+        contact = replace(contact, shift=slave_displacement - carried)
     if contact.joined is not None:
         location = contact.joined.even(location, contact.area)
     relative = now.slave @ slave_displacement - now.master @ master_displacement
@@ -241,7 +247,7 @@ def repair(
         slave_position=contact.slave_position,
         area=contact.area,
         master_rows=contact.master_rows,
-        drift=contact.drift,
+        drift=contact.present_drift,
         stiffness_per_area=contact.stiffness_per_area,
         law=contact.law,
         location=location,

@@ -43,6 +43,15 @@ class SurfaceContact:
     nodes: ContactNodes
     facets: SlaveFacets | None = None
     joined: Joined | None = None
+    turn: Array | None = None
+    shift: Array | None = None
+
+    @property
+    def present_drift(self) -> Array:
+        """The drift (m, d, p) [m/s] where the nodes are now: of a disc that turns another place goes another way."""
+        if self.turn is None or self.shift is None:
+            return self.drift
+        return self.drift - np.einsum("dep,me->mdp", self.turn, self.shift)
 
     @property
     def own(self) -> IntArray:

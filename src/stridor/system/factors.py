@@ -79,6 +79,7 @@ def _surface(surface: SurfaceContact, motions: Array) -> SurfaceContact:
     return replace(
         surface, slave=_rows(surface.slave, motions), master_rows=_rows(surface.master_rows, motions),
         drift=surface.drift * motions, nodes=_nodes(surface.nodes, motions),
+        turn=None if surface.turn is None else surface.turn * motions,
     )  # fmt: skip
 
 

@@ -109,6 +109,7 @@ def surface_contact(case: Case, view: View, name: str, contact: ContactCase) -> 
         thickness=_thickness(case, slave_body, position.shape[1]),
         freedoms=freedoms,
         repeats=view.repeats,
+        turn=_turn(case, view, contact) if contact.sliding == "finite" else None,
     )
     if facets is None:
         # A point stands for no area: its stiffness is in N/m, and it has no pressure.
@@ -238,6 +239,21 @@ def _drift(case: Case, view: View, slave: str, master: str, position: Array) -> 
         if sliding is not None:
             drift[:, :, view.motion.names.index(name)] += sign * material_velocity(sliding, position)
     return drift
+
+
+def _turn(case: Case, view: View, contact: ContactCase) -> Array | None:
+    """How the master's material velocity changes from place to place (d, d, p) [1/s], for each prescribed motion; None
+    where it does not."""
+    name = contact.master.partition(".")[0]
+    sliding: SlidingTable | None = getattr(case.bodies[name], "sliding", None)
+    if sliding is None or not sliding.spin:
+        return None
+    d = case.dimension
+    turn = np.zeros((d, d, len(view.motion.names)))
+    turn[:, :, view.motion.names.index(name)] = (
+        material_velocity(sliding, np.eye(d)) - material_velocity(sliding, np.zeros((1, d)))
+    ).T
+    return turn
 
 
 def material_velocity(sliding: SlidingTable, position: Array) -> Array:

@@ -168,6 +168,8 @@ def frictionless_modes(shifted: Shifted, enough: Callable[[Array, int], bool]) -
     mass = shifted.problem.mass
     empty = ForcedShapes(np.zeros((shifted.problem.size, 0)), np.zeros((0, 0)))
     block, _ = orthonormal(shifted.problem, empty, _start(shifted))
+    if not block.count:  # rigid contact leaves nothing that could vibrate
+        return _polished(shifted, block.u)
     basis, image = block, np.zeros((0, 0))
     for _ in range(MOST_BLOCKS):
         answer = ForcedShapes(shifted.solve(mass @ block.u)[0], np.zeros((0, block.count)))

@@ -99,7 +99,7 @@ def _drift(machine: Machine, surfaces: tuple[SurfaceContact, ...], nodes: Contac
             # Of nodes that are one, images slide as each other (`pairs`).
             tangents = nodes.tangents[own]
             apart = tangents if surface.joined is None else surface.joined.tangents(tangents[surface.joined.into])
-            found[own] = np.einsum("mqd,mdp->mqp", apart, surface.drift)[surface.first]
+            found[own] = np.einsum("mqd,mdp->mqp", apart, surface.present_drift)[surface.first]
     return found.reshape(nodes.tangent_lift.shape)
 
 
