@@ -336,7 +336,7 @@ class _CurveSearch:
     def _look_for_passages(self) -> list[tuple[str, Array]]:
         """Count on a mesh that is fine where no curve says how the number of growing modes changes; and where it does
         other than by modes that pass the highest frequency or meet at rest."""
-        seen, pairs = refined(self._clear, self._differ)
+        seen, pairs = refined(self._clear, self._differ, [(at.p, at) for at in self.found.looked])
         judged = [(one, other) for one, other in pairs if one.count.judged and other.count.judged]
         wrong = [place for one, other in judged if (place := self._difference(one, other)) is not None]
         self.found.passing |= len(judged) < len(pairs)
