@@ -166,6 +166,30 @@ def test_nastran_header_in_large_fields():
     assert same(read("a.pch", "$ DMIG\n" + DMIG.replace("+,2,1", "$ between\n\n+,2,1")), Q)
 
 
+def test_a_line_that_is_no_card_within_a_column_is_refused():
+    """What stands behind it would be lost otherwise; behind the last line of a column nothing is."""
+    text = "DMIG,K,0,1,2,0\nDMIG,K,3,1,,3,1,4.\n{}{},7,2,-1.\nDMIG,K,7,2,,7,2,5.\n"
+    for line in ("# c", "1,2,3", "a remark"):
+        for between in ("", ",12,3,1.\n"):
+            with pytest.raises(CaseError) as refused:
+                read("a.pch", text.format(between, f"{line}\n"))
+            assert str(refused.value) == (
+                f"a.pch, line {4 if between else 3}: {line!r} – is no card, no comment ($) and no continuation, and a column "
+                "goes on behind it; take the line out, or put a $ before it"
+            )
+    wanted = [[4, 0], [-1, 5]]
+    assert same(read("a.pch", text.format("", "$ c\n")), wanted)
+    assert same(read("a.pch", text.format("", "") + "# c\n"), wanted)
+    assert same(read("a.pch", text.format("", "").replace("DMIG,K,7", "# c\nGRID,1,,0.,0.,0.\n+,1\nDMIG,K,7")), wanted)
+
+
+def test_bulk_data_end_at_enddata():
+    for end in ("ENDDATA\n", " enddata $ of it\n"):
+        assert same(read("a.pch", DMIG + end + "DMIG,K,1,1,,2,1,99.\n,3\nINCLUDE 'x'\n"), Q)
+    with pytest.raises(CaseError, match="holds no DMIG card before ENDDATA"):
+        read("a.pch", "ENDDATA\n" + DMIG)
+
+
 # -- Harwell–Boeing and CalculiX ---------------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     "layout",

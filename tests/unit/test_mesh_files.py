@@ -1,5 +1,6 @@
 """Reading Gmsh and VTK files, and what is said of files that cannot be read."""
 
+import importlib
 import shutil
 from pathlib import Path
 
@@ -219,6 +220,96 @@ def test_a_built_in_shape_written_and_read_is_the_same(tmp_path, kind, version):
     read = old[mesh.boundaries[named if path.suffix == ".msh" else "2"][facet_kind]]
     assert sorted(read.tolist()) == sorted(facets.tolist())
     check_mesh(mesh, "mesh")
+
+
+def vtk(path, version, kind, *, field, mark=b""):
+    """Two triangles in a binary legacy file, in the regions 1 and 200, as whole numbers of a type of VTK's."""
+    kinds = {"int": ">i4", "vtktypeint64": ">i8", "unsigned_char": ">u1", "short": ">i2", "long": ">i8"}
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=">f8")
+
+    def whole(name, values):
+        return np.array(values, dtype=kinds[name]).tobytes() + b"\n"
+
+    data = mark + f"# vtk DataFile Version {version}\nx\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n".encode()
+    data += corners.tobytes() + b"\n"
+    if version == "5.1":
+        data += b"CELLS 3 6\nOFFSETS vtktypeint64\n" + whole("vtktypeint64", [0, 3, 6])
+        data += b"CONNECTIVITY vtktypeint64\n" + whole("vtktypeint64", [0, 1, 2, 0, 2, 3])
+    else:
+        data += b"CELLS 2 8\n" + whole("int", [3, 0, 1, 2, 3, 0, 2, 3])
+    data += b"CELL_TYPES 2\n" + whole("int", [5, 5]) + b"CELL_DATA 2\n"
+    head = f"FIELD FieldData 1\nregion 1 2 {kind}\n" if field else f"SCALARS region {kind} 1\nLOOKUP_TABLE default\n"
+    path.write_bytes(data + head.encode() + whole(kind, [1, 200]))
+    return path
+
+
+@pytest.mark.parametrize("field", [True, False])
+@pytest.mark.parametrize(
+    ("version", "kind"),
+    [("5.1", "int"), ("5.1", "vtktypeint64"), ("5.1", "unsigned_char"), ("5.1", "short"), ("5.1", "long"), ("3.0", "int")],
+)
+def test_whole_numbers_of_binary_vtk_files_are_as_wide_as_their_type(tmp_path, version, kind, field):
+    mesh = read_mesh(vtk(tmp_path / "a.vtk", version, kind, field=field))
+    assert {name: r["triangle"].tolist() for name, r in mesh.regions.items()} == {"1": [0], "200": [1]}
+    assert importlib.import_module("meshio.vtk._vtk_51").vtk_to_numpy_dtype_name["int"] == "int"  # as it is for others
+
+
+@pytest.mark.parametrize("version", ["5.1", "4.2"])
+def test_a_mark_of_utf8_before_a_vtk_file_is_passed_over(tmp_path, version):
+    plain = tmp_path / "plain.vtk"
+    made = shapes.rectangle((0, 0), (2, 1), (2, 1))
+    raw = meshio.Mesh(np.pad(made.points, ((0, 0), (0, 1))), [("quad", made.cells["quad"])])
+    meshio.write(plain, raw, file_format=f"vtk{version.replace('.', '')}", binary=False)
+    if version == "5.1":
+        meshio.vtk.write(plain, raw, fmt_version="5.1", binary=False)
+    text = plain.read_bytes()
+    assert text.startswith(f"# vtk DataFile Version {version}\n".encode())
+    (tmp_path / "marked.vtk").write_bytes(b"\xef\xbb\xbf" + text)
+    for one, other in zip((read_mesh("marked.vtk"), read_mesh(plain)), ("marked.vtk", "plain.vtk"), strict=True):
+        assert one.source == other
+        assert np.array_equal(one.points, made.points)
+        assert np.array_equal(one.cells["quad"], made.cells["quad"])
+    assert read_mesh(vtk(tmp_path / "b.vtk", version, "int", field=True, mark=b"\xef\xbb\xbf")).cell_count == 2
+
+
+def view(section, items, *, binary):
+    """A view of Gmsh's on some nodes or elements: number, and a value each (an element's nodes: as many values)."""
+    each = 3 if section == "ElementNodeData" else 0
+    head = f'${section}\n1\n"a view"\n1\n0.0\n3\n0\n1\n{len(items)}\n'.encode()
+    if binary:
+        kinds = [("number", "<i4"), *([("nodes", "<i4")] if each else []), ("value", "<f8", (max(each, 1),))]
+        rows = np.array([(k, *([each] if each else []), [0.1 * k] * max(each, 1)) for k in items], dtype=kinds)
+        body = rows.tobytes() + b"\n"
+    else:
+        body = "".join(f"{k} {f'{each} ' if each else ''}{' '.join(['1.5'] * max(each, 1))}\n" for k in items).encode()
+    return head + body + f"$End{section}\n".encode()
+
+
+@pytest.mark.parametrize("section", ["NodeData", "ElementData", "ElementNodeData"])
+@pytest.mark.parametrize("binary", [True, False])
+@pytest.mark.parametrize("version", ["gmsh", "gmsh22"])
+def test_views_of_gmsh_on_some_nodes_or_elements_are_passed_over(tmp_path, section, version, binary):
+    """They are no part of the mesh, whatever stands behind them."""
+    made = shapes.rectangle((0, 0), (2, 1), (2, 1), kind="triangle")
+    points, cells = np.pad(made.points, ((0, 0), (0, 1))), [("triangle", made.cells["triangle"])]
+    count = len(made.cells["triangle"])
+    tags = {"gmsh:physical": [np.ones(count, dtype=int)], "gmsh:geometrical": [np.ones(count, dtype=int)]}
+    entities = {"gmsh:dim_tags": np.full((len(points), 2), [2, 1])} if version == "gmsh" else {}
+    path = tmp_path / "a.msh"
+    raw = meshio.Mesh(points, cells, cell_data=tags, point_data=entities, field_data={"body": np.array([1, 2])})
+    meshio.write(path, raw, file_format=version, binary=binary)
+    plain, data = read_mesh(path), path.read_bytes()
+    views = view(section, [2], binary=binary) + view(section, [4, 1], binary=binary)
+    where = data.index(b"$Nodes")
+    for text in (data + views, data[:where] + views + data[where:]):
+        path.write_bytes(text)
+        mesh = read_mesh(path)
+        assert np.array_equal(mesh.points, plain.points)
+        assert np.array_equal(mesh.cells["triangle"], plain.cells["triangle"])
+        assert list(mesh.regions) == ["body"]
+    if section != "ElementNodeData":
+        path.write_bytes(data + views[:-6])
+        assert "it breaks off, or holds something else where numbers should be (no $End" in refused(path)
 
 
 def test_vtk_data_of_zeros_and_ones_marks_a_group(tmp_path):

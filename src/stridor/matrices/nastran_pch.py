@@ -2,7 +2,7 @@
 
 A header card says what a matrix is, a card for each column lists its entries as (grid, component, value, imaginary).
 Small fields of 8, large fields of 16 (DMIG*) and fields between commas may be mixed; all other cards are passed over,
-but for INCLUDE, which is refused: what it takes in may be columns.
+but for INCLUDE, which is refused: what it takes in may be columns. Bulk data end at ENDDATA.
 """
 
 from __future__ import annotations
@@ -23,6 +23,12 @@ from .nastran import LARGEST_GRID, REAL, SYMMETRIC, check_form, named
 from .numbers import fortran_number, whole_number
 from .source import Doubt, MatrixFile, printable, source_at, unended
 
+_CARD = re.compile(r"[A-Z][A-Z0-9]*\s*\*?", re.IGNORECASE)  # the first field of one
+_END = re.compile(r"\s*ENDDATA\b", re.IGNORECASE)
+_FOREIGN = (
+    "is no card, no comment ($) and no continuation, and a column goes on behind it; take the line out, or put a $ "
+    "before it"
+)
 _INCLUDE = re.compile(r"\s*INCLUDE\b\s*[='\"\w./\\]", re.IGNORECASE)
 _FIRST_ENTRY = 4  # name, grid and component of the column, nothing
 _ACCEPTED = (1, SYMMETRIC)
@@ -70,7 +76,8 @@ def read(path: Path, name: str | None, where: str) -> StoredMatrix:
     for card in _cards(source, data):
         _take(source, card, matrices, None if name is None else name.strip().upper())
     if not matrices:
-        source.refuse("holds no DMIG card; ask Nastran for them with EXTSEOUT(…,DMIGPCH)")
+        before = " before ENDDATA" if re.search(rb"^[ \t]*ENDDATA\b", data, re.IGNORECASE | re.MULTILINE) else ""
+        source.refuse(f"holds no DMIG card{before}; ask Nastran for them with EXTSEOUT(…,DMIGPCH)")
     square = [m.name for m in matrices.values() if m.form in _ACCEPTED]
     everything = [m.name for m in matrices.values()]
     key = chosen_in_any_case(source, name, square if name is None and square else everything)
@@ -99,12 +106,15 @@ def _stored(source: MatrixFile, found: _Matrix, notes: tuple[str, ...]) -> Store
 
 
 def _cards(source: MatrixFile, data: bytes) -> Iterator[_Card]:
-    """DMIG cards, their continuation lines joined."""
+    """DMIG cards, their continuation lines joined, up to ENDDATA."""
     card: _Card | None = None
+    foreign: tuple[int, str] | None = None  # a line right behind a DMIG card that may have broken it off
     for number, raw in enumerate(data.decode("latin-1").split("\n"), 1):
         line = raw.partition("$")[0].rstrip()
         if not line.strip():
             continue
+        if _END.match(line):
+            break
         if _INCLUDE.match(line):
             source.refuse_line(number, raw, "INCLUDE, and files taken in are not read: bring all cards into one file")
         free = "," in line
@@ -129,7 +139,13 @@ def _cards(source: MatrixFile, data: bytes) -> Iterator[_Card]:
             if card is not None:
                 card.lines.append((len(card.fields), number, raw))
                 card.fields += fields
+            elif foreign is not None:
+                source.refuse_line(*foreign, _FOREIGN)
             continue
+        if _CARD.fullmatch(head):
+            foreign = None
+        elif card is not None:
+            foreign = number, raw
         if card is not None:
             yield card
         keyword = head.rstrip("* ").upper()

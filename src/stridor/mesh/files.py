@@ -7,7 +7,6 @@ its number.
 from __future__ import annotations
 
 import contextlib
-import importlib
 import io
 import itertools
 import warnings
@@ -20,6 +19,7 @@ import numpy as np
 from ..errors import CaseError
 from ..reading import bounded
 from ..typing import IntArray
+from . import readers
 from .abaqus import read_abaqus
 from .boundary import require_boundary as require_boundary
 from .claims import check_claims
@@ -30,7 +30,6 @@ from .model import Mesh
 from .paths import check_file, in_one_line, shown_path
 
 SUFFIXES = (".msh", ".vtk", ".vtu", ".inp")
-_MODULES = {".msh": "meshio.gmsh", ".vtk": "meshio.vtk", ".vtu": "meshio.vtu"}
 _LOOKS = {
     ".msh": "a Gmsh mesh (format 2.2 or 4.1)",
     ".vtk": "a legacy VTK unstructured grid",
@@ -83,7 +82,7 @@ def _through_meshio(file: Path, suffix: str, where: str) -> Any:
             # NumPy's way of saying that a file ended before its numbers did.
             warnings.filterwarnings("error", message="string or file could not be read", category=DeprecationWarning)
             # The format's own reader: meshio.read() would exit the interpreter where that raises.
-            return importlib.import_module(_MODULES[suffix]).read(str(file))
+            return readers.read(file, suffix)
     except MemoryError:
         raise
     except (Exception, SystemExit) as error:

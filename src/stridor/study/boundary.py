@@ -15,21 +15,23 @@ import numpy as np
 
 from ..asking import FUNCTION, NUMBER, TEXT, WHOLE, takes
 from ..case.matrix_checks import MU
-from ..errors import CaseError
+from ..errors import AnalysisError, CaseError
 from ..modal.boundary import Found, StabilityCurve, boundaries
 from ..modal.parametric import ReducedModel
 from ..threads import one_thread
-from ..typing import IntArray
+from ..typing import Array, IntArray
 from .asked import require_friction, require_range
 from .boundary_again import position_error, solved_again
+from .boundary_counts import CountedAt
 from .boundary_problem import BoundaryAsked, Method, plane_of, solved_problem
-from .boundary_result import Boundary, BoundaryCurve, CountedAt
+from .boundary_result import Boundary, BoundaryCurve
 from .boundary_words import sentence, told
 from .options import options_of
 from .provenance import provenance
 from .workspace import Problem, Workspace
 
 BESIDE = 1e-4  # of the ranges: how far beside a curve the others are counted
+INSIDE = 1e-9  # of the ranges: how far inside the rectangle at least
 
 
 @takes(
@@ -112,8 +114,21 @@ def _beside(found: Found, curve: StabilityCurve) -> IntArray:
         return numbers
     for k, spot in enumerate(curve.spots):
         calm = spot.p - BESIDE * spot.gradient / np.hypot(*spot.gradient)
-        numbers[k] = max(found.said(calm)[0], 0)
+        # Curves end at the edge: beyond it a way would go round them.
+        calm = np.clip(calm, INSIDE, 1.0 - INSIDE)
+        modes, roots, _ = found.said(calm)
+        # Roots are certain. Of two or more it takes their values to say whether they are pairs.
+        numbers[k] = max(_modes_at(found, calm, roots, modes) if found.parts and roots >= 2 else modes, 0)
     return numbers
+
+
+def _modes_at(found: Found, p: Array, roots: int, otherwise: int) -> int:
+    """How many modes so many growing roots (n) at a point (2,) are; what else is said where it shows other ones."""
+    try:
+        count = found.plane.count(found.plane.modes(p))
+    except AnalysisError:
+        return otherwise
+    return count.modes if count.roots == roots else otherwise
 
 
 def _lines(found: Found) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -129,5 +144,5 @@ def _lines(found: Found) -> tuple[tuple[float, ...], tuple[float, ...]]:
 
 def _counted(found: Found) -> tuple[CountedAt, ...]:
     plane = found.plane
-    places = [(plane.low + (plane.high - plane.low) * at.p, at.count.modes) for at in found.looked]
-    return tuple(CountedAt(float(p[0]), float(p[1]), modes) for p, modes in places)
+    places = [(plane.low + (plane.high - plane.low) * at.p, at.count) for at in found.looked]
+    return tuple(CountedAt(float(p[0]), float(p[1]), count.modes, count.roots) for p, count in places)

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
-from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from ..digits import hertz
-from ..modal.boundary import Drawn, crossings, drawn
+from ..modal.boundary import Drawn, drawn
 from ..notebook import Shown, counted, html_table
 from ..tabular import Cell, Rows, Tabular, dataset
 from ..typing import Array, BoolArray, IntArray
+from .boundary_counts import BESIDE, CountedAt, Numbers, numbers_of, roots_fit
 
-BESIDE = 1e-9  # of the ranges: how far inside the rectangle a point on its edge counts as
 WHOLE = ("curve", "growth_side", "modes_beside")
 HEADS = (
     "curve", "kind", "frequency_hz", "tangent_x", "tangent_y", "growth_side", "modes_beside", "boundary_error",
@@ -110,15 +107,6 @@ class SolvedAgain:
     residual: float
 
 
-@dataclass(frozen=True)
-class CountedAt:
-    """A point between the lines at which all modes were solved for, and how many of them grow."""
-
-    x: float
-    y: float
-    unstable_modes: int
-
-
 @dataclass(frozen=True, repr=False)
 class Boundary(Tabular):
     """Curves on which modes begin to grow, over two numbers x and y of a case (paths, or "mu").
@@ -157,10 +145,12 @@ class Boundary(Tabular):
     def unstable_modes(self, x: float, y: float) -> int:
         """How many modes grow at a point (a flutter pair is one), from the nearest counted point across the curves.
 
-        Two diverging modes that meet and flutter count as two still, where no counted point is near.
+        How many roots grow is as certain as the curves: a pair is two of them, a mode that grows without oscillating
+        one. Where a pair parts into two such modes is on no curve, so that where two or more roots grow the number of
+        modes is that of the nearest counted point from which none has to part on the way; ``shading`` says where it is
+        known.
         """
-        p = self._share(x, y)
-        return self._from(int(np.argmin(np.hypot(*(self._places - p).T))), p)
+        return self._numbers.at(self._share(x, y))
 
     def unstable_modes_over(self, xs: Array, ys: Array) -> IntArray:
         """The same on a grid: (nx, ny) at values xs (nx,) and ys (ny,), rising, at the cost of a line for each x."""
@@ -169,48 +159,10 @@ class Boundary(Tabular):
     def shading(self, xs: Array, ys: Array) -> tuple[IntArray, BoolArray]:
         """How many modes grow on a grid (nx, ny) at values xs (nx,) and ys (ny,), rising; and where that is known. It
         is not between three counted points that say different numbers: there growing modes pass the highest frequency,
-        or two that diverge meet and flutter."""
+        or a pair parts into two that grow without oscillating. One root that grows is one mode."""
         grid = np.stack(np.meshgrid(*(np.asarray(v, dtype=float) for v in (xs, ys)), indexing="ij"), axis=-1)
-        grid = np.clip((grid - self._low) / self._width, BESIDE, 1 - BESIDE)  # ty: ignore[unsupported-operator]
-        table, known = self._by_curves(grid), np.ones(grid.shape[:2], dtype=bool)
-        # Curves that end within the rectangle make what they say depend on the way: here it is the same for both.
-        more = self._counts - [self._up_to(p) for p in self._places]
-        if not np.any(more):
-            return table, known
-        table += more[cKDTree(self._places).query(grid)[1]]
-        around = corners_of(self._places, grid)
-        triples, number = np.unique(np.sort(around.reshape(-1, around.shape[-1])), axis=0, return_inverse=True)
-        even = (np.ptp(more[triples], axis=1) == 0) & self._fit(triples)
-        for i, j in np.argwhere(~even[number].reshape(known.shape)).tolist():
-            said = {self._from(k, grid[i, j]) for k in around[i, j].tolist()}
-            known[i, j], table[i, j] = len(said) == 1, min(said)
-        return table, known
-
-    def _fit(self, triples: IntArray) -> BoolArray:
-        """Whether (n,) counted points of triples (n, 3) differ by what the curves between them say."""
-        pairs = {(i, j) for triple in triples.tolist() for i, j in combinations(triple, 2)}
-        fit = {(i, j): self._from(i, self._places[j]) == self._counts[j] for i, j in pairs}
-        return np.array([all(fit[pair] for pair in combinations(triple, 2)) for triple in triples.tolist()])
-
-    def _by_curves(self, grid: Array) -> IntArray:
-        """How many modes grow on a grid (nx, ny, 2), in shares of the ranges, as the curves say from the first counted
-        point."""
-        table = np.zeros(grid.shape[:2], dtype=np.int64)
-        for column, numbers in zip(grid, table, strict=True):
-            foot, top = column[0] * (1, 0) + (0, BESIDE), column[-1]
-            numbers[:] = self._from(0, foot)
-            for passed in crossings(self._drawn, foot, top):
-                numbers[column[:, 1] > foot[1] + passed.at * (top[1] - foot[1])] += int(np.sign(passed.roots))
-        return table
-
-    def _up_to(self, p: Array) -> int:
-        """The same at one point (2,)."""
-        foot = np.array([p[0], BESIDE])
-        return self._from(0, foot) + _change(self._drawn, foot, p)
-
-    def _from(self, k: int, p: Array) -> int:
-        """How many modes grow at a point (2,) as the curves say straight from a counted point."""
-        return int(self._counts[k]) + _change(self._drawn, self._places[k], p)
+        inside = np.clip((grid - self._low) / self._width, BESIDE, 1 - BESIDE)  # ty: ignore[unsupported-operator]
+        return self._numbers.over(inside)
 
     def _share(self, x: float, y: float) -> Array:
         """A point in shares of the ranges, off the edges, on which curves end."""
@@ -226,12 +178,8 @@ class Boundary(Tabular):
         return np.array([self.x_range[1], self.y_range[1]]) - self._low
 
     @cached_property
-    def _places(self) -> Array:
-        return (np.array([[c.x, c.y] for c in self.counted]) - self._low) / self._width
-
-    @cached_property
-    def _counts(self) -> IntArray:
-        return np.array([c.unstable_modes for c in self.counted])
+    def _numbers(self) -> Numbers:
+        return numbers_of(self.counted, self._drawn, self._low, self._width)
 
     @cached_property
     def _drawn(self) -> list[Drawn]:
@@ -367,26 +315,11 @@ def _check_document(document: Any) -> None:
     numbers = [told["lines_x"], told["lines_y"], *points, [told["max_frequency_hz"]]]
     if not all(np.all(np.isfinite(np.array(row, dtype=float))) for row in numbers):
         raise ValueError("it holds numbers that are not finite")
+    if not all(roots_fit(c["unstable_modes"], c.get("roots")) for c in told["counted"]):
+        raise ValueError("growing roots that are no such number of modes")
     for curve in told["curves"]:
         if curve["kind"] not in ("flutter", "divergence") or len(curve["ends"]) != 2:
             raise ValueError("a curve of no known kind")
-
-
-def _change(curves: Sequence[Drawn], start: Array, end: Array) -> int:
-    """By how many more modes grow at the end of a line."""
-    return sum(int(np.sign(c.roots)) for c in crossings(curves, start, end))
-
-
-def corners_of(places: Array, grid: Array) -> IntArray:
-    """Numbers (nx, ny, 3) of the places (k, 2) between which the points of a grid (nx, ny, 2) lie, the nearest three
-    where they lie between none."""
-    nearest = cKDTree(places).query(grid, k=min(3, len(places)))[1].reshape(*grid.shape[:2], -1)
-    try:
-        mesh = Delaunay(places)
-    except (QhullError, ValueError):  # fewer than three, or all on one line
-        return nearest
-    name = mesh.find_simplex(grid)
-    return np.where((name >= 0)[..., None], mesh.simplices[name], nearest)
 
 
 def drawn_curve(curve: BoundaryCurve, low: Array, width: Array) -> Drawn:

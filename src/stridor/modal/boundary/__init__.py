@@ -5,8 +5,8 @@ along a curve, `curve` what comes of it, `crossings` where straight lines cross 
 curves are found and what is counted between them.
 """
 
-from .curve import Drawn, StabilityCurve, crossings, drawn
+from .curve import Drawn, StabilityCurve, carried, crossings, drawn
 from .plane import Plane
 from .search import Found, boundaries
 
-__all__ = ["Drawn", "Found", "Plane", "StabilityCurve", "boundaries", "crossings", "drawn"]
+__all__ = ["Drawn", "Found", "Plane", "StabilityCurve", "boundaries", "carried", "crossings", "drawn"]

@@ -138,3 +138,21 @@ def crossings(curves: Sequence[Drawn], start: Array, end: Array) -> list[Crossin
             roots = int(np.sign(sine)) * int(sides[k]) * curve.roots
             found.append(Crossing(at, float(omega[k] + part * (omega[k + 1] - omega[k])), number, abs(sine), roots))
     return sorted(found, key=lambda c: c.at)
+
+
+def carried(modes: int, roots: int, passed: Sequence[Crossing]) -> tuple[int, int, bool]:
+    """How many modes and roots grow beyond crossings, from how many before them; and whether a pair that grows had to
+    part on the real axis on the way, or two roots there to meet, which is on no curve.
+
+    Roots are conserved but for what crosses; modes are not: what crosses at a divergence is one root, and the one that
+    it left behind grows on. What crosses has to be there, so that of n roots there are n/2 modes at least and n at
+    most.
+    """
+    parted = False
+    for crossing in passed:
+        modes, roots = modes + int(np.sign(crossing.roots)), roots + crossing.roots
+        if roots >= 0:  # else more decay than grow: growth left the band on the way
+            within = min(max(modes, (roots + 1) // 2), roots)
+            parted |= within != modes
+            modes = within
+    return modes, roots, parted

@@ -21,7 +21,7 @@ from ...typing import Array
 from ..onset import Onset
 from ..tolerances import UNSTABLE_RELATIVE
 from .climb import ModesAtPoint, climb, tops
-from .curve import Crossing, Drawn, StabilityCurve, crossings
+from .curve import Crossing, Drawn, StabilityCurve, carried, crossings
 from .march import apart, joined, traced, without_points
 from .passing import FINEST, refined
 from .plane import Count, Plane
@@ -92,17 +92,19 @@ class Found:
         """The curves in straight pieces."""
         return [curve.drawn for curve in self.curves]
 
-    def said(self, p: Array, since: Looked | None = None) -> tuple[int, int]:
+    def said(self, p: Array, since: Looked | None = None) -> tuple[int, int, bool]:
         """How many modes and roots grow at a point (2,) as the curves say, from the nearest point at which it was
-        counted, or another one."""
+        counted, or another one; and whether modes had to part or meet on the way (`carried`)."""
         if since is None:
             places = np.array([at.p for at in self.looked])
             since = self.looked[int(np.argmin(np.hypot(*(places - p).T)))]
-        passed = crossings(self.drawn, since.p, p)
-        return (
-            since.count.modes + sum(int(np.sign(c.roots)) for c in passed),
-            since.count.roots + sum(c.roots for c in passed),
-        )
+        return carried(since.count.modes, since.count.roots, crossings(self.drawn, since.p, p))
+
+    @property
+    def parts(self) -> bool:
+        """Whether modes may grow without oscillating anywhere, so that roots alone do not say how many grow."""
+        counts = (at.count for at in self.looked)
+        return any(curve.kind == "standstill" for curve in self.curves) or any(c.roots != 2 * c.modes for c in counts)
 
     @property
     def agree(self) -> bool:
@@ -158,6 +160,8 @@ class _CurveSearch:
         self.found.wrong = [*self._contradicted(), *self._unmatched()]
         if self.found.passing or any("band" in curve.ends for curve in self.found.curves):
             self._look_beside()
+        if self.found.parts:
+            self._look_where_roots_pass_zero()
         if self.found.passing or self._more_changes():
             self.found.wrong += self._look_for_passages()
         return self.found
@@ -309,18 +313,30 @@ class _CurveSearch:
                 if np.all((calm > 0) & (calm < 1)):
                     self._look(calm)
 
+    def _look_where_roots_pass_zero(self) -> None:
+        """Count on both sides of divergence where several roots grow: what passes zero there is either of two that a
+        pair parted into, which is told by no count before that, or one that was alone all the way."""
+        for curve in self.found.curves:
+            for spot in curve.spots[::2] if curve.kind == "standstill" else ():
+                aside = ASIDE * spot.gradient / np.hypot(*spot.gradient)
+                sides = [spot.p - aside, spot.p + aside]
+                if np.all((np.array(sides) > 0) & (np.array(sides) < 1)) and self.found.said(sides[1])[1] > 1:
+                    for side in sides:
+                        self._look(side)
+
     def _more_changes(self) -> bool:
         """Whether a growing mode is near the highest frequency somewhere, or modes are not as many as curves say."""
         looked = self.found.looked
         return not all(at.count.judged for at in looked) or any(self._differ(*pair) for pair in pairwise(looked))
 
     def _differ(self, one: Looked, other: Looked) -> bool:
-        return self.found.said(other.p, one)[0] != other.count.modes
+        modes, _, parted = self.found.said(other.p, one)
+        return parted or modes != other.count.modes
 
     def _look_for_passages(self) -> list[tuple[str, Array]]:
         """Count on a mesh that is fine where no curve says how the number of growing modes changes; and where it does
         other than by modes that pass the highest frequency or meet at rest."""
-        seen, pairs = refined(self._clear, self._differ)
+        seen, pairs = refined(self._clear, self._differ, [(at.p, at) for at in self.found.looked])
         judged = [(one, other) for one, other in pairs if one.count.judged and other.count.judged]
         wrong = [place for one, other in judged if (place := self._difference(one, other)) is not None]
         self.found.passing |= len(judged) < len(pairs)
