@@ -3,6 +3,7 @@
 import importlib
 import shutil
 from pathlib import Path
+from types import FunctionType
 
 import meshio
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from stridor.errors import CaseError
-from stridor.mesh import shapes
+from stridor.mesh import readers, shapes
 from stridor.mesh.files import read_mesh, require_boundary
 from stridor.mesh.quality import check_mesh
 
@@ -497,3 +498,12 @@ def test_a_long_path_is_shown_by_its_end(tmp_path):
     assert text.endswith("aaa/pad.msh' – no such file")
     assert text.startswith("mesh.file: '…aaa")
     assert "cannot be read: File name too long" in message(lambda: read_mesh(Path("a" * 300 + ".msh")))
+
+
+def test_another_meshio_reads_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    def otherwise() -> FunctionType:
+        raise AttributeError("a name that this version does not have")
+
+    own = importlib.import_module("meshio.gmsh.main").read_buffer
+    assert readers._made(otherwise, "meshio.gmsh.main") is own
+    assert readers._made(readers._gmsh, "meshio.gmsh.main") is not own

@@ -2,13 +2,15 @@
 
 Of legacy VTK files of version 5.1 `int` is 4 bytes wide, which its reader takes for 8, and the other plain types of C
 are those of older versions, which it does not know. A mark of UTF-8 before the first line is passed over. Views of
-Gmsh's, data at nodes or elements, are as well: they are no part of a mesh, and may be of some of its nodes only.
+Gmsh's, data at nodes or elements, are as well: they are no part of a mesh, and may be of some of its nodes only. Where
+another version of meshio is made otherwise, its own readers do.
 """
 
 from __future__ import annotations
 
 import importlib
 import importlib.util
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from types import FunctionType, ModuleType
@@ -24,10 +26,18 @@ def read(file: Path, suffix: str) -> Any:
         return importlib.import_module("meshio.vtu").read(str(file))
     with file.open("rb") as stream:
         if suffix == ".msh":
-            return _gmsh()(stream)
+            return _made(_gmsh, "meshio.gmsh.main")(stream)
         if stream.read(len(MARK)) != MARK:
             stream.seek(0)
-        return _vtk()(stream)
+        return _made(_vtk, "meshio.vtk._main")(stream)
+
+
+def _made(reader: Callable[[], FunctionType], plain: str) -> FunctionType:
+    """The reader that was made of meshio's, or its own of that module."""
+    try:
+        return reader()
+    except (AttributeError, ImportError, KeyError):
+        return importlib.import_module(plain).read_buffer
 
 
 @cache
