@@ -26,7 +26,9 @@ class SurfaceContact:
     against the master's at each slave node for a body that slides through its mesh (a turning disc), for each
     prescribed motion at factor one. stiffness_per_area [N/m³], infinite for rigid. facets: those between the slave
     nodes where they are known. Slave nodes that the master does not face at the start take no part. joined: which of
-    the m are one node of the contact, as the body repeats; None where none are.
+    the m are one node of the contact, as the body repeats; None where none are. turn (d, d, p) [1/s]: by how much the
+    master's material moves faster from place to place as it turns, for each motion, None where it does not; shift
+    (m, d) [m]: how far the nodes have come over the master since the start, whose places ``drift`` is of.
     """
 
     name: str
