@@ -24,7 +24,7 @@ from stridor.app.page.worker import PATIENCE, Program, Worker
 HERE = Path(__file__).parent
 PATIENT = 60.0  # seconds for what takes one, on a busy machine
 # Read before any process is hung up. Under load a file that was opened right after that came without its first four
-# bytes, three times in full runs; who reads them is not found.
+# bytes, twice in full runs; who reads them is not found.
 TWO_BEAMS = Source.template("two-beams")
 
 
