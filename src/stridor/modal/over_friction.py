@@ -46,11 +46,13 @@ def modes_of_band(
     numbered_at: float = 0.0,
     check: bool = True,
     residuals: bool = True,
+    carried: Carried | None = None,
 ) -> ComplexModes:
     """Every mode of a band at the friction coefficients ``mu``, as `complex_modes` follows them and `checked_modes`
     completes them, each with the nodes that touch at its μ. Whatever says something about which modes grow takes this
     list; check=False leaves `checked_modes` out, and nothing else. At a μ where there is no steady sliding among others
-    where there is, all is NaN (`ComplexModes.unsolved`). Raises as `complex_modes`."""
+    where there is, all is NaN (`ComplexModes.unsolved`). carried: what a basis at one μ hands on, to the same μ of a
+    neighbouring system. Raises as `complex_modes`."""
     options = options or Options()
     values = np.atleast_1d(np.asarray(mu, dtype=float))
 
@@ -72,7 +74,7 @@ def modes_of_band(
         return checked_modes(held, found, max_frequency_hz, own=own, options=options)
 
     if len(values) < 2 or not (np.all(np.isfinite(values)) and np.all(values >= 0)):
-        return said(checked(system, followed(system, values, progress)))
+        return said(checked(system, followed(system, values, progress, carried=carried)))
     over = stretches(system, float(values.min()), float(values.max()), at=values, solver=options.solver)
     parts = _parts(over, values)
     if len(parts) == 1 and not parts[0][0].reason:

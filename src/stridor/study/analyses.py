@@ -155,7 +155,7 @@ def _modes(
         own = work.own_friction if work.has_contacts and in_proportion is None else None
         result = modes_of_band(
             system, values, band, damped=damped, vectors=vectors, own=own, options=options, progress=progress,
-            check=check, residuals=residuals,
+            check=check, residuals=residuals, carried=work.handed,
         )  # fmt: skip
         notes = taken_as_closed(system)
         if check:

@@ -77,7 +77,9 @@ def rank_countermeasures(
     work = Workspace.of(problem)
     case = work.case("the ranking of countermeasures")
     refuse_stick(work.system(mu), "the ranking of countermeasures")
-    linear = Linearised.of(work, mu, count=count, max_frequency_hz=max_frequency_hz, damped=damped)
+    linear = Linearised.of(
+        work, mu, count=count, max_frequency_hz=max_frequency_hz, damped=damped, hand_on=verify > 0
+    )
     unstable = linear.columns("unstable")
     if not unstable:
         told = (*linear.warnings, f"no mode is unstable at μ = {linear.mu:g}: there is nothing to remove")

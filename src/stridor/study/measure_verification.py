@@ -9,6 +9,7 @@ import numpy as np
 
 from ..modal.complex_modes import ComplexModes
 from ..modal.growing import doubt
+from ..modal.krylov.kept_factors import KeptFactors
 from ..modal.over_friction import modes_of_band
 from ..modal.unfit import Unfit
 from ..system import System
@@ -59,7 +60,11 @@ def _solved(system: System, linear: Linearised, mu: float, band: float, numbered
         # Sparse matrices for small systems too: a mass at one node leaves their complete basis no proportional damping.
         with suppress(Unfit):
             krylov = replace(options, source="krylov")
-            return modes_of_band(system, mu, band, damped=damped, options=krylov, numbered_at=numbered_at)
+            # What is taken of it stays that of no change, and what is not to be handed on need not be exact.
+            carried = replace(linear.handed, factors=KeptFactors(), inner=(True, True))
+            return modes_of_band(
+                system, mu, band, damped=damped, options=krylov, numbered_at=numbered_at, carried=carried
+            )
     return modes_of_band(system, mu, band, damped=damped, options=options, numbered_at=numbered_at)
 
 

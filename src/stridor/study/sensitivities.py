@@ -34,6 +34,7 @@ from ..modal.derivatives import (
     solve_mode_released,
 )
 from ..modal.growing import doubt
+from ..modal.krylov import Carried
 from ..modal.pencil import Pencil
 from ..sliding import share_factors, steady_nodes
 from ..system import System, build_system
@@ -187,8 +188,8 @@ class Linearised:
     """A case at one μ with the modes of its band, what each number does to its matrices, and the modes' vectors as
     they are asked for."""
 
-    def __init__(self, work: Workspace, mu: float, modes: ComplexModes, *, damped: bool) -> None:
-        self.work, self.mu, self.modes, self.damped = work, mu, modes, damped
+    def __init__(self, work: Workspace, mu: float, modes: ComplexModes, *, damped: bool, handed: Carried) -> None:
+        self.work, self.mu, self.modes, self.damped, self.handed = work, mu, modes, damped, handed
         self.case, self.options = work.case("a sensitivity"), work.options
         self.system = self._as_asked(work.system(mu))
         self.eigenvalues: ComplexArray = modes.eigenvalues[0]
@@ -214,8 +215,10 @@ class Linearised:
         count: int | None = None,
         max_frequency_hz: float | None = None,
         damped: bool | None = None,
+        hand_on: bool = False,
     ) -> Linearised:
-        """At ``mu`` (default: the case's own friction), settings as `sensitivities` takes them."""
+        """At ``mu`` (default: the case's own friction), settings as `sensitivities` takes them. hand_on: keep what the
+        modes' basis hands on to that of a system with a small change."""
         work = Workspace.of(problem)
         work.case("a sensitivity")
         require_friction(mu, several=False)
@@ -224,8 +227,13 @@ class Linearised:
             accepted = f"one friction coefficient for all contacts, since {different_friction(work.system())}"
             raise CaseError("mu", None, accepted)
         damped = work.modal.damped if damped is None else damped
-        modes = modes_at(work, value, count=count, max_frequency_hz=max_frequency_hz, damped=damped)
-        return Linearised(work, value, modes, damped=damped)
+        handed = Carried()
+        work.handed = handed if hand_on else None
+        try:
+            modes = modes_at(work, value, count=count, max_frequency_hz=max_frequency_hz, damped=damped)
+        finally:
+            work.handed = None
+        return Linearised(work, value, modes, damped=damped, handed=handed)
 
     def value(self, path: str) -> float:
         """The number at a path. Raises CaseError where there is none."""

@@ -23,6 +23,7 @@ from ..case.messages import problems_of
 from ..case.schema import DEFAULT_PHASES, Comparison, Modal, Phase, Phases, Temporal
 from ..errors import AnalysisError, CaseError, kind_of
 from ..laws.friction import Shared, own_law
+from ..modal.krylov import Carried
 from ..modal.options import Options
 from ..notebook import Shown, counted
 from ..sliding import full_motion
@@ -84,6 +85,7 @@ class Workspace(Shown):
         self.temporal: Temporal = settings.temporal
         self.comparison: Comparison = settings.comparison
         self.answers = AnswerCache()
+        self.handed: Carried | None = None  # of modes at one μ, for those of systems with a small change
 
     @staticmethod
     def of(problem: Problem) -> Workspace:

@@ -76,14 +76,15 @@ def krylov_modes(
         count = SAMPLES if top == 0.0 else max(FEWEST, round(SAMPLES * (1.0 - numbered_at / top)))
         inner = (False, False) if handed is None else handed.inner
         frictions = numbered_at + samples(top - numbered_at, count)
-        converge_over(reduced, frictions, between=NAMES, left=left, inner=inner)
         # A basis that was handed on has been nowhere near some of these μ.
         to = BELIEVED if handed is None else HANDED
+        between = NAMES if numbered_at < top else to
+        converge_over(reduced, frictions, between=between, left=left, inner=inner)
         done, _, planned = at_each(
             values, lambda at: converge_at(reduced, [at], tolerance=to, left=left), progress
         )
         if handed is not None:
-            handed.take(reduced, GUARD)
+            handed.take(reduced, GUARD, last=single is not None)
         found = _followed(reduced, done, band, damped=damped, vectors=vectors, start=numbered_at, of_basis=left)
         planned = found.planned if planned is None else planned
         return replace(found, max_frequency_hz=max_frequency_hz, planned=planned)

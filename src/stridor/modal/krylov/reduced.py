@@ -131,6 +131,11 @@ class Reduced(DenseProblem):
         return _span(self._all_kept()[0])
 
     @property
+    def exact_last(self) -> Array:
+        """The same of the vectors kept last."""
+        return _span(_padded(self._kept[-1][0], self.pairs.count))
+
+    @property
     def stiffness(self) -> Array:
         """UᵀKU + PᵀcP (k, k) of the pairs, whose mass is one: what they are without friction."""
         own = self.pairs.count
