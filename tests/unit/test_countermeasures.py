@@ -16,6 +16,7 @@ from solid_cases import case, slider
 from stridor.app.conclusions import of_countermeasures
 from stridor.case import Case, loads, template_text
 from stridor.errors import CaseError
+from stridor.modal.krylov import Carried
 from stridor.study.analyses import modes
 from stridor.study.contact_edges import edge_rows
 from stridor.study.countermeasures import Countermeasures, Measure, Verified, rank_countermeasures
@@ -99,6 +100,35 @@ def test_chamfers_are_named_ranked_and_verified():
     assert first.verified is not None
     assert first.verified.removed == pytest.approx(first.removed, rel=0.1)
     assert first.words == "take 5.26 % of the contact away: rub, leading edge, 1 row"
+
+
+def test_a_change_at_a_few_freedoms_is_solved_on_the_basis_of_no_change_to_the_same(monkeypatch):
+    model, fit, begun = case(slider(space=False, stiffness=1e13)), Carried.fit, []
+
+    def fits(self: Carried, *given: object) -> bool:
+        begun.append(fit(self, *given))
+        return begun[-1]
+
+    def ranking(**asked) -> list[Measure]:
+        found = rank_countermeasures(model, mu=0.6, max_frequency_hz=60e3, percent=20.0, **asked)
+        assert all(m.verified is not None for m in found.measures)
+        return sorted(found.measures, key=lambda m: (m.kind, m.name))
+
+    few = {"numbers": [], "chamfers": 1, "verify": 9}
+    monkeypatch.setattr(Carried, "fit", fits)
+    handed = ranking(**few)
+    assert {m.kind for m in handed} == {"added mass", "chamfer"}
+    assert begun.count(True) >= 3, "begun with what was handed on"
+    begun.clear()
+    ranking(numbers=["materials.steel.density"], chamfers=0, added_mass=False)
+    assert begun
+    assert not any(begun), "a density changes all of them"
+    monkeypatch.setattr(Carried, "fit", lambda *_: False)
+    for one, other in zip(handed, ranking(**few), strict=True):
+        assert one.name == other.name
+        assert one.verified.removed == pytest.approx(other.verified.removed, rel=1e-6)
+        assert one.verified.removed_sum == pytest.approx(other.verified.removed_sum, rel=1e-6)
+        assert one.verified.unstable_hz == pytest.approx(other.verified.unstable_hz, rel=1e-9)
 
 
 def test_the_leading_edge_is_where_the_other_material_comes_in():
