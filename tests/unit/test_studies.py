@@ -26,7 +26,7 @@ from matrix_cases import matrix_case
 from mode_coupling import mode_coupling
 from program import stridor
 from stridor.case import template_text
-from stridor.errors import CaseError
+from stridor.errors import AnalysisError, CaseError
 from stridor.studies import reduced_rows
 from stridor.studies.effect import without_effect
 from stridor.studies.parts import Part
@@ -98,6 +98,9 @@ def test_parts_put_together_are_the_whole(grid: st.Study, whole, tmp_path: Path)
     told = merged(tmp_path, tmp_path / "study.zarr", grid)
     assert told == ["parts missing: 2 of 3; their rows are not computed"]
     assert st.open_study(tmp_path).pending == 3
+    shutil.copytree(tmp_path / "part-1-of-3", tmp_path / "part-2-of-3")
+    assert merged(tmp_path, tmp_path / "study.zarr", grid) == [*told, "part-2-of-3 holds the rows of part-1-of-3"]
+    shutil.rmtree(tmp_path / "part-2-of-3")
     st.run_study(grid, tmp_path, workers=1, part=Part(2, 3))
     assert merged(tmp_path, tmp_path / "study.zarr", grid) == []
     assert same(st.open_study(tmp_path).data, whole.data)
@@ -113,6 +116,21 @@ def test_parts_put_together_are_the_whole(grid: st.Study, whole, tmp_path: Path)
             merged(tmp_path, tmp_path / "study.zarr", given)
     assert same(st.open_study(tmp_path).data, before)
     assert merged(tmp_path, tmp_path / "study.zarr", grid.model_copy(update={"restart_failed": True})) == []
+
+
+def test_a_part_of_a_study_has_no_sobol_indices(tmp_path: Path) -> None:
+    """Not of the blocks that it happens to hold, and no traceback where it cuts through one."""
+    parameters = {"mu": {"range": (0.6, 1.0)}, "bodies.m.mass": {"range": (0.9, 1.1)}}
+    study = st.Study(case=mode_coupling(0.02), parameters=parameters, sampling={"method": "saltelli", "samples": 4, "seed": 1})
+    for number, count in ((1, 2), (2, 3)):
+        found = st.run_study(study, tmp_path / str(count), workers=1, part=Part(number, count))
+        with pytest.raises(AnalysisError, match=rf"part {number}/{count} of the rows .* \(--merge\)"):
+            found.indices()
+        (title, _, rows) = tables(found)[-1]
+        assert title.startswith("No Sobol indices: these are part")
+        assert rows == []
+    whole = st.run_study(study, tmp_path / "whole", workers=1)
+    assert whole.indices().names == ("mu", "bodies.m.mass")
 
 
 def test_parts_of_several_versions_are_not_put_together_without_a_word(tmp_path: Path) -> None:

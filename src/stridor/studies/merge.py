@@ -43,6 +43,9 @@ def merged(folder: Path, path: Path, given: Study, *, go_on: bool = False) -> li
     if missing := [str(k) for k in range(1, count + 1) if k not in present]:
         listed = ", ".join(missing[:20]) + (" …" if len(missing) > 20 else "")
         told.append(f"parts missing: {listed} of {count}; their rows are not computed")
+    for location, head in zip(places, heads, strict=True):
+        if location.parent.name != (own := Part.read(head.part).folder.name):
+            told.append(f"{location.parent.name} holds the rows of {own}")
     rows: dict[int, Row] = {}
     notes: list[Mapping[str, Any]] = []
     for location in places:

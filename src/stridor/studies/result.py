@@ -162,9 +162,14 @@ class StudyResult(Tabular, Shown):
 
     def indices(self, of: str | None = None) -> Indices:
         """Sobol indices of a result of one number a row (default: the largest growth rate, or the critical μ). Raises
-        AnalysisError for other methods than "saltelli" and rows without a result."""
+        AnalysisError for other methods than "saltelli", rows without a result and a part of a study."""
         if self.method != "saltelli":
             raise AnalysisError(f'Sobol indices need sampling.method = "saltelli", not "{self.method}"')
+        if part := str(self.data.attrs.get("part", "")):
+            # Samples stand in blocks of p + 2, which a part may cut through: a fraction of them says something else.
+            raise AnalysisError(
+                f"these are part {part} of the rows and Sobol indices need every one; put the parts together (--merge)"
+            )
         name = of or {"modes": "largest_growth_rate", "onsets": "critical_mu"}.get(self.compute, "")
         if name not in self.data or self.data[name].dims != ("row",):
             known = ", ".join(str(n) for n, v in self.data.items() if v.dims == ("row",) and v.dtype.kind == "f")
