@@ -20,10 +20,12 @@ Branches = tuple[IntArray, ComplexArray]
 class Onset(Shown):
     """One critical friction coefficient.
 
-    mu, frequency_hz: where; kind: flutter (two modes meet), divergence (a mode at zero frequency) or contact (from
+    mu, frequency_hz: where; kind: flutter (at a frequency), divergence (a mode at zero frequency) or contact (from
     this μ on other nodes touch, and a mode grows with them that did not before, or the other way round);
     damped: with or without C; stabilising: True where growth ends there instead of beginning;
-    branches: the two modes that meet, numbered from 1 by frequency at μ = 0; (0, 0) where branches were not followed.
+    branches: the two modes that meet, or the one that begins to grow and the nearest where damping lets none meet;
+    twice the same where one leaves the axis by itself at the low end; numbered from 1 by frequency at μ = 0, (0, 0)
+    where branches were not followed.
     square_root_coefficient κ [1/s]: beyond an undamped onset growth opens as κ √(μ − μ_c); with
     damping it belongs to the exceptional point at the complex μ ``exceptional_mu`` close by (None if
     none was found). growth_slope d Re λ/dμ [1/s] (None undamped, where it is infinite; 0 where growth opens at the low
@@ -49,7 +51,7 @@ class Onset(Shown):
         """Where it is, at which frequency, and what happens there."""
         modes = ""
         if any(self.branches):
-            modes = f" of mode{'s' if self.kind == 'flutter' else ''} {self.branch_words(' and ')}"
+            modes = f" of mode{'s' if len(self._named) > 1 else ''} {self.branch_words(' and ')}"
         ends = ", where growth ends" if self.stabilising else ""
         return f"μ = {fixed(self.mu, 6)}, {measured(self.frequency_hz, 1)} Hz, {self.kind}{modes}{ends}"
 
@@ -65,10 +67,13 @@ class Onset(Shown):
         return (-1 if self.stabilising else 1) * (1 if alone else 2)
 
     def branch_words(self, between: str) -> str:
-        """The modes that meet, or the one that diverges; a dash where branches were not followed."""
-        if not any(self.branches):
-            return "–"
-        return between.join(str(b) for b in (self.branches if self.kind == "flutter" else self.branches[:1]))
+        """The modes that meet, or the one that grows by itself or diverges; a dash where branches were not followed."""
+        return between.join(str(b) for b in self._named) if any(self.branches) else "–"
+
+    @property
+    def _named(self) -> tuple[int, ...]:
+        """The modes that are told, each once."""
+        return tuple(dict.fromkeys(self.branches)) if self.kind == "flutter" else self.branches[:1]
 
     def to_json(self) -> dict[str, Any]:
         """Plain values, as `stridor onsets --json` prints them."""

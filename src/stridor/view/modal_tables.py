@@ -156,7 +156,7 @@ def _onsets(onsets: Onsets, name: str, printed: tuple[ReferenceOnset, ...]) -> T
         "frequency [Hz]",
         "printed [Hz]",
         "difference",
-        "modes that meet",
+        "modes",
         "kind",
         "remark",
         "note",
@@ -168,7 +168,7 @@ def _onsets(onsets: Onsets, name: str, printed: tuple[ReferenceOnset, ...]) -> T
         "at μ = 0."
     )
     if all(o.kind == "flutter" for o in onsets.onsets):
-        caption += " All are flutter: two modes meet."
+        caption += " All are flutter: growth begins or ends at a frequency."
     if printed:
         caption += " Differences beyond 0.5 % are marked with ▲; ≙: equal when rounded to the digits printed."
     return drop_empty(Table(f"onsets-{name}", f"Onsets, {name}", heads, tuple(rows), frozenset({6, 7, 8, 9}), caption))

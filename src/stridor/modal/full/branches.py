@@ -228,9 +228,9 @@ def _opening(source: Along, end: RegionModes, state: BranchState, top: float) ->
         width = family.high - family.low
         least = max(FLAT * size / width, 1e-6 * float(np.abs(slopes).max()), decay / (OPENING * width))
         for slope in slopes[slopes.real > least]:
-            near = np.argsort(np.abs(state.values - lam[0]))[: max(len(mine), 2)]
+            near = np.argsort(np.abs(state.values - lam[0]))[: len(mine)]
             branch = int(near[0])
-            partner = int(near[1]) if len(near) > 1 else branch
+            partner = int(near[1]) if len(near) > 1 else branch  # a simple root leaves the axis by itself
             onset = Onset(
                 mu=family.low, frequency_hz=float(lam[0].imag / (2 * np.pi)), kind="flutter",
                 damped=family.dissipates, stabilising=False,
@@ -258,12 +258,9 @@ def _told(opened: dict[int, Opening], passage: Passage, near: float) -> Opening 
 
 def _begins(source: Along, way: Followed, branch: int, root: Root, top: float) -> BranchOnset:
     """An onset at the low end, or so near it that its growth is not seen there."""
-    distance = np.abs(way.low.values - way.low.values[branch])
-    distance[branch] = np.inf
-    partner = int(np.argmin(distance)) if len(distance) > 1 else branch
     onset = Onset(
         mu=root.mu, frequency_hz=root.lam.imag / (2 * np.pi), kind="flutter", damped=source.family.dissipates,
-        stabilising=False, branches=_numbers(source, branch, partner), residual=root.residual,
+        stabilising=False, branches=_numbers(source, branch, branch), residual=root.residual,
         square_root_coefficient=None, growth_slope=root.slope,
     )  # fmt: skip
     t = root.mu - source.family.low
