@@ -168,8 +168,9 @@ class Greedy:
         found = [_on(modes, self.basis.count) for _, modes in self.passed]
         cut = [replace(m, right=turn.T @ m.right, left=turn.T @ m.left) for m in found]
         matrices = assembled(model.projected, problem.factors(problem.reference), problem.powers)
+        directions = spanned(cut, matrices, self.frequency)
         for share in STATES:
-            states = spanned(cut, matrices, self.frequency, share)
+            states = directions.but(share)
             if states.count > WORTH * model.size:
                 break
             tried = replace(model, states=states)

@@ -59,22 +59,45 @@ class States:
         return DenseModes(values[chosen], x, y)
 
 
-def spanned(
-    found: Sequence[DenseModes], matrices: tuple[Array, Array, Array], frequency: float, share: float
-) -> States:
-    """The states of modes at several points, all on one basis, but for directions smaller than ``share`` of the
-    largest: right and left ones that see each other in A − E of the matrices, so that what is left out on one side is
-    on the other, and LᵀAR has no modes of its own."""
+@dataclass(frozen=True)
+class StateDirections:
+    """Right and left states of modes (2r, k), and the singular values (k,) of how they see each other, the largest
+    first."""
+
+    right: Array
+    left: Array
+    size: Array
+
+    def but(self, share: float) -> States:
+        """Those that are larger than ``share`` of the largest."""
+        keep = self.size > share * self.size[0]
+        return States(self.right[:, keep], self.left[:, keep])
+
+
+def spanned(found: Sequence[DenseModes], matrices: tuple[Array, Array, Array], frequency: float) -> StateDirections:
+    """The directions of the states of modes at several points, all on one basis: right and left ones that see each
+    other in A − E of the matrices, so that what is left out on one side is on the other, and LᵀAR has no modes of its
+    own."""
     right, left = (
         np.hstack([_states(m.values / frequency, getattr(m, side)) for m in found]) for side in ("right", "left")
     )
     mass, damping, stiffness = matrices
     (up, low), moving = np.split(right, 2), frequency**2 * mass
     seen = np.vstack([stiffness @ up + frequency * (damping @ up) + moving @ low, moving @ (up - low)])
-    one, size, other = sl.svd(left.T @ seen, full_matrices=False)
-    keep = size > share * size[0]
-    scale = 1.0 / np.sqrt(size[keep])
-    return States(right @ (other[keep].T * scale), left @ (one[:, keep] * scale))
+    # Many modes have no more directions than there are states: R Lᵀ of two triangles has the singular values of all.
+    turns, triangles = zip(*(_triangular(part) for part in (left, seen)), strict=True)
+    one, size, other = sl.svd(triangles[0] @ triangles[1].T, full_matrices=False)
+    at = size > 0.0
+    scale = 1.0 / np.sqrt(size[at])
+    return StateDirections(
+        right @ (turns[1] @ (other[at].T * scale)), left @ (turns[0] @ (one[:, at] * scale)), size[at]
+    )
+
+
+def _triangular(states: Array) -> tuple[Array, Array]:
+    """Q and R of the transposed (k, 2r): Q R = statesᵀ."""
+    q, r = sl.qr(states.T, mode="economic")
+    return q, r
 
 
 def _states(mu: ComplexArray, vectors: ComplexArray) -> Array:
