@@ -102,15 +102,13 @@ def node_table(
     index = np.unique(np.concatenate(touched)).astype(np.int64)
     ptr, col, row = _by_node(m, w, index, (fixed.matrix, base.matrix), fixed, base)
     push_ptr, push_col, push = _by_node(m, w, index, (fixed_answers, base_answers), fixed, base)
-    block = np.zeros((m, w, w))
+    block, row_of = np.zeros((m, w, w)), np.full((m, w), -1)
+    row_of[fixed.node, fixed.place] = np.arange(len(fixed.node))
+    rows, moved = (sp.csr_array(each)[:, index] for each in (fixed.matrix, fixed_answers))
     for j in range(w):
-        for k in range(w):
-            # Of nodes that have both: rows of a tilt belong to some only.
-            one, other = (np.flatnonzero(fixed.place == each) for each in (j, k))
-            both = np.intersect1d(fixed.node[one], fixed.node[other])
-            one, other = one[np.isin(fixed.node[one], both)], other[np.isin(fixed.node[other], both)]
-            together = fixed.matrix[one].multiply(fixed_answers[other])
-            block[both, j, k] = np.asarray(together.sum(axis=1)).ravel()
+        both = (row_of[:, [j]] >= 0) & (row_of >= 0)  # rows of a tilt belong to some nodes only
+        one, other = np.broadcast_to(row_of[:, [j]], row_of.shape)[both], row_of[both]
+        block[:, j][both] = np.asarray(rows[one].multiply(moved[other]).sum(axis=1)).ravel()
     p = nodes.normal_lift.shape[1]
     lift = np.zeros((m, w, p))
     lift[:, 0] = nodes.normal_lift
