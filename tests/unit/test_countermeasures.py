@@ -11,6 +11,8 @@ import pytest
 
 import stridor as st
 from benches import paper_case
+from matrix_cases import matrix_case
+from mode_coupling import mode_coupling
 from rubbing_block import RUBBING_MASS
 from solid_cases import case, slider
 from stridor.app.conclusions import of_countermeasures
@@ -211,8 +213,43 @@ def test_what_was_solved_again_is_ranked_by_that_and_what_did_harm_is_told(monke
 def test_the_next_command_sets_what_the_case_has():
     model = loads(RUBBING_MASS)
     for path, option in (("contacts.rub.compliance", "contacts.rub.stiffness=0.952381"), ("mu", "0.608")):
-        found = rank_countermeasures(model, numbers=[path], verify=int(path != "mu"), added_mass=False)
+        found = rank_countermeasures(model, numbers=[path], verify=1, added_mass=False)
         assert of_countermeasures(found, partial(number_at, model), None).options[-1] == option
+
+
+def test_less_friction_is_solved_again_with_less_friction(beams, tmp_path):
+    """Of all contacts, of the one there is by its path, of one of two, and in factors of matrices."""
+
+    def removed(case: Case, path: str, mu: float | None, **asked) -> float:
+        found = rank_countermeasures(case, mu=mu, numbers=[path], added_mass=False, chamfers=0, percent=10.0, **asked)
+        ((measure,), warnings) = found.measures, found.warnings
+        assert not any("left out" in w for w in warnings)
+        assert measure.verified is not None
+        return measure.verified.removed_sum
+
+    def growth(case: Case, mu: float | None, **asked) -> float:
+        found = modes(case, mu, **asked)
+        return float(found.growth_rate[0][found.unstable[0] & found.in_band[0]].sum())
+
+    band = {"max_frequency_hz": 20e3}
+    less = growth(beams, 0.3, **band) - growth(beams, 0.27, **band)
+    assert less > 100.0
+    for path in ("mu", "contacts.A.friction.coefficient"):
+        assert removed(beams, path, 0.3, **band) == pytest.approx(less, rel=1e-8)
+    other = {"type": "mass", "mass": 2.0, "position": (1, 0)}
+    rests = {"between": ("n", "m"), "direction": (1.0, 0.5), "stiffness": 0.1}
+    rub = mode_coupling().contacts["rub"].model_copy(update={"slave": "n"}).model_dump(exclude_unset=True)
+    single = mode_coupling()
+    two = single.with_(
+        {"bodies.n": other, "springs.x": rests, "contacts.b": rub, "loads.on_n": {"at": "n", "force": (0, -1)}}
+    )
+    lower = two.with_({"contacts.rub.friction.coefficient": 0.81})
+    less = growth(two, None) - growth(lower, None)
+    assert removed(two, "contacts.rub.friction.coefficient", None) == pytest.approx(less, rel=1e-8)
+    one, skew = np.eye(2), np.array([[0.0, 1.0], [-1.0, 0.0]])
+    terms = [(one, "mass", ""), (0.1 * one, "damping", ""), (4.0 * one, "stiffness", ""), (skew, "stiffness", "mu")]
+    matrices = matrix_case(tmp_path, terms, 1.0)
+    assert removed(matrices, "mu", 0.5) == pytest.approx(growth(matrices, 0.5) - growth(matrices, 0.45), rel=1e-8)
 
 
 def test_changes_of_rounding_only_help_nothing(monkeypatch):

@@ -160,6 +160,8 @@ def of_countermeasures(result: Countermeasures, value_of: Callable[[str], float]
     name, new = number.name, more_of(value, number.direction * number.percent)
     if name == "mu":
         return Conclusion(said, "modes", ("--mu", f"{new:.6g}"))
+    if name == "parameters.mu.value" or (mu is not None and name.endswith(".friction.coefficient")):
+        return Conclusion(said)  # --mu is asked for of all contacts, whatever the case has
     if name.endswith(".compliance"):  # a case has its inverse
         name, new = name.removesuffix("compliance") + "stiffness", 1 / new
     return Conclusion(said, "modes", (*own, "--set", f"{name}={new:.6g}"))

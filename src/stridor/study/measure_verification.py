@@ -27,8 +27,7 @@ def verified(ranking: Ranking, measure: Measure, count: int | None, max_frequenc
     lowest = None if max_frequency_hz is not None else linear.case.modal.modes if count is None else count
     # Which modes are the lowest at μ = 0 matters where not all are looked at.
     numbered = lowest is not None and lowest <= len(linear.modes.branch)
-    system = _changed(linear, measure)
-    mu = linear.friction(system)
+    system, mu = _changed(linear, measure)
     modes = _solved(system, linear, mu, band, 0.0 if numbered else mu)
     if lowest is not None:
         modes = modes.lowest(lowest)
@@ -68,14 +67,17 @@ def _solved(system: System, linear: Linearised, mu: float, band: float, numbered
     return modes_of_band(system, mu, band, damped=damped, options=options, numbered_at=numbered_at)
 
 
-def _changed(linear: Linearised, measure: Measure) -> System:
-    """The system with the change made."""
+def _changed(linear: Linearised, measure: Measure) -> tuple[System, float]:
+    """The system with the change made, and the friction coefficient that is asked for of it."""
     if measure.kind == "number":
         assert measure.changed is not None, "a number has a value"
-        return linear.varied(measure.name, measure.changed)
-    if measure.kind == "added mass":
-        return _heavier(linear.system, measure)
-    return _chamfered(linear, measure)
+        rubbing = linear.with_friction(measure.name, measure.changed)
+        if rubbing is not None:
+            return rubbing
+        system = linear.varied(measure.name, measure.changed)
+    else:
+        system = _heavier(linear.system, measure) if measure.kind == "added mass" else _chamfered(linear, measure)
+    return system, linear.friction(system)
 
 
 def _heavier(system: System, measure: Measure) -> System:

@@ -33,6 +33,7 @@ from ..modal.derivatives import (
     solve_mode,
     solve_mode_released,
 )
+from ..laws.friction import Shared, own_law, share_of
 from ..modal.growing import doubt
 from ..modal.krylov import Carried
 from ..modal.pencil import Pencil
@@ -332,6 +333,19 @@ class Linearised:
         of its laws, else the one asked for."""
         own = friction_in_sliding(system) if self.follows_law else None
         return self.mu if own is None else own
+
+    def with_friction(self, path: str, mu: float) -> tuple[System, float] | None:
+        """The system whose friction coefficient at a path is ``mu``, and what is to be asked for of all its contacts;
+        None where there is none at that path."""
+        if path in _FRICTION:
+            return self._as_asked(self.work.system(mu)), mu
+        contact, nodes = _contact_of(self.case, path), self.system.contact_nodes()
+        if not contact or not self._is_friction(path) or self._without(contact):
+            return None
+        own = [mu if n == contact else self.mu * share_of(w) for n, w in zip(nodes.names, nodes.laws, strict=True)]
+        largest = max(own) or 1.0
+        laws = [Shared(own_law(law), each / largest) for law, each in zip(nodes.laws, own, strict=True)]
+        return self.system.with_laws(laws), max(own)
 
     def varied(self, path: str, value: float) -> System:
         """The system with another number at a path, with or without damping as this one. Raises CaseError."""
