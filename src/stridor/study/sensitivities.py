@@ -20,6 +20,7 @@ from ..case.usual import is_of_shape, is_place
 from ..digits import measured
 from ..direct import Nearby
 from ..errors import AnalysisError, CaseError
+from ..laws.friction import Shared, own_law, share_of
 from ..modal.complex_modes import ComplexModes
 from ..modal.derivatives import (
     Mode,
@@ -33,7 +34,6 @@ from ..modal.derivatives import (
     solve_mode,
     solve_mode_released,
 )
-from ..laws.friction import Shared, own_law, share_of
 from ..modal.growing import doubt
 from ..modal.krylov import Carried
 from ..modal.pencil import Pencil
