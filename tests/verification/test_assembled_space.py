@@ -387,7 +387,7 @@ def in_a_meshed_bore(radius, facets, *, angle=0.0, velocity=(0.0, 0.0, 0.0)):
     return replace(system, initial_velocity=np.array(velocity))
 
 
-@pytest.mark.parametrize("facets", [24, 96])
+@pytest.mark.parametrize("facets", [24, pytest.param(96, marks=pytest.mark.slow)])
 def test_linear_facets_press_as_the_curve_does_whatever_the_step(facets):
     """The polygon has edges; offsets that faded over steps followed it, by blows of up to 260 times the force."""
     radius, angle, off = 0.09, 1.0, []

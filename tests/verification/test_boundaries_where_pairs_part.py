@@ -114,7 +114,7 @@ def test_one_root_of_a_pair_that_parted_bounds_nothing_calm(parted: Boundary) ->
     assert {c.roots for c in found.counted} == {1, 2}
 
 
-@pytest.mark.parametrize("seed", [33, 39, 42])
+@pytest.mark.parametrize("seed", [42])  # weekly with 119 others
 def test_random_problems_whose_flutter_turns_into_divergence(tmp_path: Path, seed: int) -> None:
     assert not wrong(seed, tmp_path)
 
