@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import CaseError
-from ..reading import irregular
+from ..reading import irregular, is_utf_16
 
 _LONGEST = 120
 _LONGEST_PATH = 56
@@ -23,8 +23,10 @@ def check_file(file: Path, where: str, suffixes: tuple[str, ...]) -> str:
             raise CaseError(where, shown_path(file), reason)
         if file.stat().st_size == 0:
             raise CaseError(where, shown_path(file), "the file is empty (0 bytes)")
-        with file.open("rb"):
-            pass
+        with file.open("rb") as stream:
+            if is_utf_16(stream.read(2)):
+                text = "is text of UTF-16, two bytes a character, as some shells write it; save it as UTF-8 or ASCII"
+                raise CaseError(where, shown_path(file), text)
     except FileNotFoundError:
         raise CaseError(where, shown_path(file), "no such file") from None
     except (OSError, ValueError) as error:  # ValueError: a name with a NUL
