@@ -184,13 +184,18 @@ def test_files_that_hold_nothing(folder: Path, name: str) -> None:
 def test_a_file_of_another_kind(folder: Path) -> None:
     (folder / "a.stl").write_text("solid")
     assert told(lambda: case_of(folder, "a.stl")) == [
-        f"bodies.slider.file: '{shown_path(folder / 'a.stl')}' – is no mesh file by its suffix; accepted: .msh, .vtk, "
+        f"bodies.slider.file: '{shown_path(folder / 'a.stl')}' – is a surface of triangles and no mesh yet; accepted: .msh, "
+        ".vtk, .vtu, .inp; mesh it in Gmsh, name boundaries and body, export it as .msh"
+    ]
+    (folder / "a.txt").write_text("solid")
+    assert told(lambda: case_of(folder, "a.txt")) == [
+        f"bodies.slider.file: '{shown_path(folder / 'a.txt')}' – is no mesh file by its suffix; accepted: .msh, .vtk, "
         ".vtu, .inp"
     ]
 
 
 NOISE = {
-    "a.msh": "is not readable as a Gmsh mesh (format 2.2 or 4.1): 'utf-8' codec can't decode byte 0xff in position 0: invalid start byte",
+    "a.msh": "has no $MeshFormat: it is no mesh of Gmsh's, or of a format before 2; export it from Gmsh as 4.1 or 2.2",
     "a.vtu": "is not readable as a VTK XML unstructured grid",
     "a.vtk": "is not readable as a legacy VTK unstructured grid",
 }

@@ -42,6 +42,9 @@ def check_numbers(file: Path, where: str) -> None:
     broken otherwise is left to the reader."""
     data = file.read_bytes()
     sections = {found[1]: found.end() for found in reversed(list(_SECTION.finditer(data)))}
+    if b"$MeshFormat" not in data:
+        text = "has no $MeshFormat: it is no mesh of Gmsh's, or of a format before 2; export it from Gmsh as 4.1 or 2.2"
+        raise CaseError(where, shown_path(file), text)
     if not {b"MeshFormat", b"Nodes"} <= set(sections):
         return
     if b"Elements" not in sections:

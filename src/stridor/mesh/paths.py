@@ -9,6 +9,18 @@ from ..reading import irregular, is_utf_16
 
 _LONGEST = 120
 _LONGEST_PATH = 56
+# Files of other programs that Gmsh opens, by suffix: meshes, and what has still to be meshed.
+_MESHES = {
+    **dict.fromkeys((".bdf", ".nas"), "a Nastran deck"),
+    ".med": "a MED mesh",
+    ".mesh": "a Medit mesh",
+    ".unv": "an I-deas universal file",
+}
+_GEOMETRY = {
+    **dict.fromkeys((".step", ".stp", ".iges", ".igs", ".brep"), "geometry"),
+    ".geo": "a script of Gmsh's",
+    ".stl": "a surface of triangles",
+}
 
 
 def check_file(file: Path, where: str, suffixes: tuple[str, ...]) -> str:
@@ -18,7 +30,7 @@ def check_file(file: Path, where: str, suffixes: tuple[str, ...]) -> str:
         if file.is_dir():
             raise CaseError(where, shown_path(file), f"is a folder; must be a mesh file: {', '.join(suffixes)}")
         if suffix not in suffixes:
-            raise CaseError(where, shown_path(file), f"is no mesh file by its suffix; accepted: {', '.join(suffixes)}")
+            raise CaseError(where, shown_path(file), _not_accepted(suffix, suffixes))
         if reason := irregular(file):
             raise CaseError(where, shown_path(file), reason)
         if file.stat().st_size == 0:
@@ -32,6 +44,16 @@ def check_file(file: Path, where: str, suffixes: tuple[str, ...]) -> str:
     except (OSError, ValueError) as error:  # ValueError: a name with a NUL
         raise CaseError(where, shown_path(file), f"cannot be read: {in_one_line(error)}") from error
     return suffix
+
+
+def _not_accepted(suffix: str, suffixes: tuple[str, ...]) -> str:
+    """What a file of another suffix is, and how Gmsh makes a mesh that is read of it."""
+    accepted = f"accepted: {', '.join(suffixes)}"
+    if ".msh" in suffixes and (what := _MESHES.get(suffix)):
+        return f"is {what}, which is not read; {accepted}; open it in Gmsh, name boundaries and body, export it as .msh"
+    if ".msh" in suffixes and (what := _GEOMETRY.get(suffix)):
+        return f"is {what} and no mesh yet; {accepted}; mesh it in Gmsh, name boundaries and body, export it as .msh"
+    return f"is no mesh file by its suffix; {accepted}"
 
 
 def shown_path(file: Path) -> str:
