@@ -394,7 +394,7 @@ def _loose(system: System, nodes: ContactNodes, motion: Array | None, *, far: bo
 def _parts(system: System, who: str) -> str:
     """What to add where a body's mesh does not hang together: one part may be held and another one not."""
     for solid in system.solids:
-        if who == f"body {solid.name}" and (count := pieces(Mesh(solid.points, solid.cells))) > 1:
+        if solid.cells and who == f"body {solid.name}" and (count := pieces(Mesh(solid.points, solid.cells))) > 1:
             return (
                 f": its mesh has {count} pieces that share no node, each of which a tie, a spring or a support must "
                 "hold (of a file with several bodies take one by its group)"
