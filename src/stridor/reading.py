@@ -25,6 +25,11 @@ _BOUNDS: list[None] = []
 _BEFORE: list[int] = []
 
 
+def is_utf_16(head: bytes) -> bool:
+    """Whether a file that begins so is text of UTF-16, two bytes a character, by its mark."""
+    return head.startswith((b"\xff\xfe", b"\xfe\xff"))
+
+
 def irregular(path: Path, most: int | None = None) -> str | None:
     """Why a path is no file to be read, None where it is one. Raises OSError where nothing can be said of it, with
     FileNotFoundError for what is not there, ValueError for names that cannot be.

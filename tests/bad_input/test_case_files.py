@@ -752,6 +752,10 @@ FILE_FAULTS = {
         "title = 'frein à disque'".encode("latin-1"),
         "{path}: not UTF-8 text (byte 15); save the file as UTF-8",
     ),
+    "utf-16": (
+        "title = 'disc'".encode("utf-16"),
+        "{path}: text of UTF-16, two bytes a character, as some shells write it; save the file as UTF-8",
+    ),
     "binary": (b"\x00\x01", "{path}, line 1, column 1: not valid TOML: invalid statement"),
     "nested": (b"a = " + b"[" * 100_000, "{path}: not valid TOML: nested too deeply"),
 }

@@ -221,6 +221,25 @@ def test_well_formed_files_are_read_as_before(text, end, tmp_path):
         np.testing.assert_array_equal(mesh.points, expected.points, err_msg=what)
 
 
+@pytest.mark.parametrize("text", [OLD, NEW, BLOCKS])
+def test_files_that_break_off(text, tmp_path):
+    """A last line without its end may have lost digits of its last number, and name another node."""
+    path, cut = tmp_path / "a.msh", text[: text.index("$EndElements")]
+    lines = cut.split("\n")[:-1]
+    head = lines.index("$Elements") + 1
+    for ended in (cut[:-1], cut[:-3], f"{cut}$EndElem"):
+        shown = ended.split("\n")[-1]
+        assert told(path, ended).startswith(f"a.msh, line {len(ended.splitlines())}: {shown!r} – ")
+    assert told(path, cut[:-1]).endswith("the file breaks off here, without $EndElements; save it from Gmsh again")
+    assert told(path, f"{cut}$EndElem").endswith("$Elements has no $EndElements before this; save the file from Gmsh again")
+    for lost in (1, 2, 3):
+        message = told(path, "\n".join(lines[:-lost]) + "\n")
+        assert message.startswith(f"a.msh, line {head + 1}: {lines[head]!r} – $Elements says ")
+        assert message.endswith(f"and {len(lines) - head - 1 - lost} lines follow; the file breaks off there; save it from Gmsh again")
+    assert told(path, text.replace("$EndNodes\n", "")).endswith("$Nodes has no $EndNodes before this; save the file from Gmsh again")
+    assert told(path, text[: text.index("$Elements")]).endswith("has $Nodes and no $Elements; does it break off? Save it from Gmsh again")
+
+
 @pytest.mark.parametrize("form", ["gmsh22", "gmsh"])
 @pytest.mark.parametrize("section", ["Nodes", "Elements"])
 def test_binary_files_with_other_counts(form, section, tmp_path):
@@ -246,6 +265,13 @@ def test_binary_files_with_other_counts(form, section, tmp_path):
         if form == "gmsh" or other < count:
             assert f"says {other} {section.lower()} at ${section}" in message
             assert message.endswith("save it from Gmsh again")
+    message = told(path, data[: data.index(b"$EndElements")])
+    assert message.endswith("breaks off after its 2 elements, before $EndElements; save it from Gmsh again")
+    if form == "gmsh":
+        at = data.index(b"$EndNodes") - 1 - 5 * 32  # numbers, then places
+        assert data[at : at + 8] == np.uint64(1).tobytes()
+        message = told(path, data[: at + 8] + np.uint64(1).tobytes() + data[at + 16 :])
+        assert message.endswith("has 1 nodes whose number another one has; the first is node 1")
 
 
 @pytest.mark.parametrize("form", ["gmsh22", "gmsh"])

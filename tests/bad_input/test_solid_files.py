@@ -12,7 +12,7 @@ import pytest
 import stridor as st
 from program import stridor
 from stridor.case import Case, load
-from stridor.errors import CaseError
+from stridor.errors import AnalysisError, CaseError
 from stridor.mesh import shapes
 from stridor.mesh.model import Mesh
 from stridor.mesh.paths import shown_path
@@ -184,13 +184,18 @@ def test_files_that_hold_nothing(folder: Path, name: str) -> None:
 def test_a_file_of_another_kind(folder: Path) -> None:
     (folder / "a.stl").write_text("solid")
     assert told(lambda: case_of(folder, "a.stl")) == [
-        f"bodies.slider.file: '{shown_path(folder / 'a.stl')}' – is no mesh file by its suffix; accepted: .msh, .vtk, "
+        f"bodies.slider.file: '{shown_path(folder / 'a.stl')}' – is a surface of triangles and no mesh yet; accepted: .msh, "
+        ".vtk, .vtu, .inp; mesh it in Gmsh, name boundaries and body, export it as .msh"
+    ]
+    (folder / "a.txt").write_text("solid")
+    assert told(lambda: case_of(folder, "a.txt")) == [
+        f"bodies.slider.file: '{shown_path(folder / 'a.txt')}' – is no mesh file by its suffix; accepted: .msh, .vtk, "
         ".vtu, .inp"
     ]
 
 
 NOISE = {
-    "a.msh": "is not readable as a Gmsh mesh (format 2.2 or 4.1): 'utf-8' codec can't decode byte 0xff in position 0: invalid start byte",
+    "a.msh": "has no $MeshFormat: it is no mesh of Gmsh's, or of a format before 2; export it from Gmsh as 4.1 or 2.2",
     "a.vtu": "is not readable as a VTK XML unstructured grid",
     "a.vtk": "is not readable as a legacy VTK unstructured grid",
 }
@@ -226,12 +231,14 @@ def test_files_that_break_off(folder: Path) -> None:
     ]
     msh(folder / "a.msh", POINTS, QUADS)
     whole = (folder / "a.msh").read_text()
-    for part in (0.3, 0.6, 0.95):
+    for part, words in (
+        (0.3, "has $Nodes and no $Elements; does it break off? Save it from Gmsh again"),
+        (0.6, "has $Nodes and no $Elements; does it break off? Save it from Gmsh again"),
+        (0.95, "the file breaks off here, without $EndElements; save it from Gmsh again"),
+    ):
         (folder / "a.msh").write_text(whole[: int(part * len(whole))])
         (found,) = told(lambda: case_of(folder, "a.msh"))
-        assert found.startswith(
-            f"bodies.slider.file: '{shown_path(folder / 'a.msh')}' – is not readable as a Gmsh mesh (format 2.2 or 4.1)"
-        )
+        assert found.endswith(f" – {words}")
 
 
 def test_numbers_that_are_none(folder: Path) -> None:
@@ -256,7 +263,7 @@ CELLS = {
     "one degenerate": (
         inp(POINTS, with_cell(QUADS, 2, [0, 0, 0, 0])),
         [
-            "bodies.slider: 1 of 8 cells are degenerate (zero Jacobian: flat, or nodes at one place); the first is quad cell number 3 about (0.025, 0.01)"
+            "bodies.slider: 1 of 8 cells name a node twice; the first is quad cell number 3 about (0.025, 0.01), with node 4, at (0.025, 0.01); every node of a cell is one of its own"
         ],
     ),
     "one twice": (
@@ -312,6 +319,23 @@ def test_pieces_that_share_no_node(folder: Path) -> None:
         "bodies.slider: 2 pieces that share no node; a tie, a spring or a support must hold each of them, or merge the "
         "nodes where they should be one",
     )
+    with pytest.raises(AnalysisError) as caught:
+        st.steady_sliding(case_of(folder, "a.inp"))
+    assert str(caught.value).startswith(
+        "steady sliding has no equilibrium: body slider can move freely under the loads: its mesh has 2 pieces that share "
+        "no node, each of which a tie, a spring or a support must hold (of a file with several bodies take one by its "
+        "group); fix a freedom of the loose body, or turn the load"
+    )
+
+
+@pytest.mark.parametrize("code", ["utf-16", "utf-16-be"])
+@pytest.mark.parametrize("name", ["a.msh", "a.inp", "a.vtu", "a.vtk"])
+def test_text_of_two_bytes_a_character(folder: Path, name: str, code: str) -> None:
+    mark = "" if code == "utf-16" else "\ufeff"
+    (folder / name).write_bytes((mark + inp(POINTS, QUADS, rest=named(SHEET))).encode(code))
+    (message,) = told(lambda: case_of(folder, name))
+    assert message.startswith("bodies.slider.file: ")
+    assert message.endswith("is text of UTF-16, two bytes a character, as some shells write it; save it as UTF-8 or ASCII")
 
 
 def test_cells_that_are_open_along_an_edge(folder: Path) -> None:

@@ -376,7 +376,8 @@ def test_files_that_are_not_there_or_not_files(tmp_path):
         "mesh.file: 'folder.msh' – is a folder; must be a mesh file: .msh, .vtk, .vtu, .inp"
     )
     assert refused(tmp_path / "mesh.stl") == (
-        "mesh.file: 'mesh.stl' – is no mesh file by its suffix; accepted: .msh, .vtk, .vtu, .inp"
+        "mesh.file: 'mesh.stl' – is a surface of triangles and no mesh yet; accepted: .msh, .vtk, .vtu, .inp; mesh it in "
+        "Gmsh, name boundaries and body, export it as .msh"
     )
 
 
@@ -411,7 +412,10 @@ def test_known_faults_of_gmsh_files_are_told_with_their_remedy(tmp_path):
         'physical groups; save it from Gmsh without "Save all elements"'
     )
     path.write_text(TWO_QUADS[: TWO_QUADS.index("2 1 3 1\n6")] + "2 1\n")
-    assert refused(path).startswith("mesh.file: 'a.msh' – is not readable as a Gmsh mesh (format 2.2 or 4.1)")
+    assert refused(path) == (
+        "a.msh, line 46: '7 8 1 8' – $Elements says 8 elements in 7 blocks, which are 15 lines, and 10 lines follow; the file "
+        "breaks off there; save it from Gmsh again"
+    )
 
 
 def wrong(tmp_path, cells, points=None, suffix="vtu"):
@@ -431,6 +435,29 @@ def test_elements_of_an_entity_that_is_not_there_are_told_with_its_kind_and_numb
     )
     (tmp_path / "a.msh").write_text(TWO_QUADS.replace("\n2 2 3 1\n", "\n2 2 137 1\n"))
     assert refused(tmp_path / "a.msh").endswith(": it has elements of type 137, which its reader does not know")
+    (tmp_path / "a.msh").write_text("(0 \"Fluent\")\n(2 3)\n")
+    assert refused(tmp_path / "a.msh") == (
+        "mesh.file: 'a.msh' – has no $MeshFormat: it is no mesh of Gmsh's, or of a format before 2; export it from Gmsh as "
+        "4.1 or 2.2"
+    )
+    places = "".join(f"{number} {number} 0 0\n" for number in range(1, 16))
+    wedge = f"$Nodes\n15\n{places}$EndNodes\n$Elements\n1\n1 18 0 {' '.join(map(str, range(1, 16)))}\n$EndElements\n"
+    (tmp_path / "a.msh").write_text(f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n{wedge}")
+    assert refused(tmp_path / "a.msh").endswith(
+        "has elements of type wedge15, which its reader does not know; mesh the body with hexahedra alone, or with tetrahedra"
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "what"),
+    [("a.bdf", "a Nastran deck"), ("a.nas", "a Nastran deck"), ("a.med", "a MED mesh"), ("a.UNV", "an I-deas universal file")],
+)
+def test_meshes_of_other_programs_are_named(tmp_path, name, what):
+    (tmp_path / name).write_text("GRID,1\n")
+    assert refused(tmp_path / name).endswith(
+        f"{name}' – is {what}, which is not read; accepted: .msh, .vtk, .vtu, .inp; open it in Gmsh, name boundaries and "
+        "body, export it as .msh"
+    )
     mesh = shapes.rectangle((0, 0), (1, 1), (1, 1))
     raw = meshio.Mesh(np.column_stack([mesh.points, np.zeros(4)]), [("quad", mesh.cells["quad"])])
     raw.cell_data["gmsh:physical"] = [np.array([1])]
@@ -451,7 +478,8 @@ def test_elements_of_an_entity_that_is_not_there_are_told_with_its_kind_and_numb
 def test_cells_that_cannot_be_computed_with_are_named_and_counted(tmp_path):
     accepted = "triangle, triangle6, quad, quad8, quad9, tetra, tetra10, hexahedron, hexahedron20, hexahedron27"
     assert wrong(tmp_path, [("wedge", [range(6), range(6)]), ("pyramid", [range(5)]), ("tetra", [range(4)])]) == (
-        f"mesh.file: 'odd.vtu' – has cells that cannot be computed with: 2 wedge, 1 pyramid; accepted: {accepted}"
+        f"mesh.file: 'odd.vtu' – has cells that cannot be computed with: 2 wedge, 1 pyramid; accepted: {accepted}; mesh "
+        "the body with hexahedra alone, or with tetrahedra"
     )
     assert wrong(tmp_path, [("line", [[0, 1]])]) == (
         f"mesh.file: 'odd.vtu' – has no cells; a body needs some of: {accepted}"

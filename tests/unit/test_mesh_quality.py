@@ -58,6 +58,25 @@ def test_a_midside_node_too_far_from_the_middle_inverts_a_corner():
     assert "inverted (negative Jacobian)" in problems(moved(mesh, node, (0.24, 0)))[0]
 
 
+def test_a_cell_that_names_a_node_twice():
+    mesh = unit_squares()
+    cells = mesh.cells["quad"].copy()
+    cells[1, 3] = cells[1, 2]  # drawn together to a triangle
+    text = "bodies.pad: 1 of 3 cells name a node twice; the first is quad cell number 2 about "
+    place = ", ".join(f"{x:.6g}" for x in mesh.points[cells[1]].mean(axis=0))
+    node = ", ".join(f"{x:.6g}" for x in mesh.points[cells[1, 3]])
+    wrong = replace(mesh, cells={"quad": cells}, boundaries={})
+    end = f"at ({node}); every node of a cell is one of its own"
+    assert problems(wrong) == [f"{text}({place}), with the node {end}"]
+    numbers = 10 * np.arange(len(mesh.points))
+    assert problems(replace(wrong, numbers=numbers)) == [f"{text}({place}), with node {numbers[cells[1, 3]]}, {end}"]
+    # A middle in the place of another one leaves all corners right.
+    mesh = unit_squares(kind="quad", order=2)
+    cells = mesh.cells["quad8"].copy()
+    cells[0, 5] = cells[0, 4]
+    assert "name a node twice" in problems(replace(mesh, cells={"quad8": cells}, boundaries={}))[0]
+
+
 def test_degenerate_cells_and_facets_without_area():
     mesh = unit_squares()
     collapsed = moved(mesh, node_at(mesh, 3, 1), (3, 0))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 
+import meshio
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -13,8 +14,10 @@ from stridor.contact.curve import Curve
 from stridor.contact.facets import FacetSurface
 from stridor.contact.interface import Rows
 from stridor.contact.pairing import pair_surface, repair
+from stridor.fe.elements import element
 from stridor.laws import Coulomb
 from stridor.mesh.facets import nodal_areas, nodal_normals, pressure_load, reference_nodes, shape_functions
+from stridor.mesh.kinds import KINDS
 from stridor.sliding import steady_sliding
 from stridor.sliding.pattern import unexplained_patterns
 from stridor.system import build_system
@@ -354,6 +357,65 @@ def test_an_even_pressure_stays_even_in_time(cells, below, above, stiffness):
     pressure = run.nodes.pressure
     assert pressure.shape[0] > 3
     np.testing.assert_allclose(pressure, 1e6, rtol=1e-6)
+
+
+TURNED = """
+title = "a block of one cell aslant on another"
+materials.a = {{ young_modulus = 2e10, density = 4000.0, poisson_ratio = 0.3 }}
+materials.b = {{ young_modulus = 1e11, density = 7000.0, poisson_ratio = 0.25 }}
+[bodies.low]
+type = "solid"
+model = "3d"
+material = "b"
+mesh = {{ shape = "block", corner = [0, 0, -0.02], size = [0.06, 0.03, 0.02], divisions = [3, 2, 1], cells = "{cells}" }}
+sliding = {{ velocity = [1.0, 0.0, 0.0] }}
+[bodies.up]
+type = "solid"
+model = "3d"
+material = "a"
+file = "{file}"
+[supports.base]
+at = "low.bottom"
+fixed = ["x", "y", "z"]
+[supports.side]
+at = "up.3"
+fixed = ["x", "y", "z"]
+[loads.p]
+at = "up.2"
+pressure = 3e5
+[contacts.c]
+slave = "up.1"
+master = "low.top"
+stiffness = 1e12
+friction = {{ law = "coulomb", coefficient = 0.45 }}
+[modal]
+max_frequency_hz = 40e3
+friction_range = [0.0, 0.5]
+"""
+
+
+@pytest.mark.parametrize("cells", ["hexahedron20", "hexahedron27"])
+def test_which_node_of_a_cell_comes_first_changes_nothing(tmp_path, cells):
+    nodes, facet = element(cells).nodes, KINDS[cells].facet_kind
+    turn = [[np.cos(0.4), np.sin(0.4), 0.0], [-np.sin(0.4), np.cos(0.4), 0.0], [0.0, 0.0, 1.0]]
+    points = [0.03, 0.015, 0.0] + (nodes - [0.5, 0.5, 0.0]) * [0.03, 0.015, 0.02] @ turn
+    x, y, z = nodes.T
+    found = []
+    # The cell as it is, and begun at another node: turned by 90° about z, and about y.
+    for turned in ((x, y, z), (1.0 - y, x, z), (1.0 - z, y, x)):
+        cell = np.array([np.argmin(np.abs(nodes - place).max(axis=1)) for place in np.column_stack(turned)])
+        faces = [cell[list(side)] for side in KINDS[cells].facets]
+        sides = [next(f for f in faces if np.all(nodes[f, axis] == at)) for axis, at in ((2, 0.0), (2, 1.0), (0, 1.0))]
+        blocks = [(cells, cell[None]), (facet, np.array(sides))]
+        file = tmp_path / f"{len(found)}.vtu"
+        meshio.write(file, meshio.Mesh(points, blocks, cell_data={"boundary": [[0], [1, 2, 3]]}))
+        model = st.loads(TURNED.format(cells=cells, file=file))
+        found.append((st.steady_sliding(model).normal_force, [onset.mu for onset in st.onsets(model).onsets]))
+    (force, onsets), *others = found
+    assert onsets
+    for again, beside in others:
+        np.testing.assert_allclose(again, force, rtol=0, atol=1e-12 * force.max())
+        np.testing.assert_allclose(beside, onsets, rtol=0, atol=1e-12)
 
 
 def test_steady_sliding_tells_of_nodes_that_open_without_a_reason():

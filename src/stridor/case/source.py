@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from ..asking import OVERRIDES, PATH, TEXT, takes
 from ..errors import CaseError, kind_of
-from ..reading import irregular
+from ..reading import irregular, is_utf_16
 from .outsized import deep_line
 
 if TYPE_CHECKING:
@@ -41,9 +41,10 @@ def load(path: str | PathLike[str], overrides: Sequence[str] = ()) -> Case:
         if source.endswith((".npz", ".nc", ".zarr")):
             told = "no case file but a result; `stridor plot` draws what analyses wrote, `stridor reduce` takes models"
             raise CaseError(source, None, told) from None
-        raise CaseError(
-            source, None, f"not UTF-8 text (byte {error.start}); save the file as UTF-8"
-        ) from None
+        if is_utf_16(error.object):
+            told = "text of UTF-16, two bytes a character, as some shells write it; save the file as UTF-8"
+            raise CaseError(source, None, told) from None
+        raise CaseError(source, None, f"not UTF-8 text (byte {error.start}); save the file as UTF-8") from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise CaseError(source, None, f"cannot be read: {reason}") from None

@@ -2,7 +2,12 @@
 
 What is integrated over a slave facet, the product of its functions and the master's, has kinks where the master goes
 from facet to facet. In the plane the slave is cut at the master's nodes, in space by the outlines of its facets,
-projected along the normal of the slave facet; within a piece everything is smooth and Gauss's points are exact.
+projected along the normal of the slave facet; within a piece everything is smooth.
+
+Where facets are affine it is a polynomial. Functions of a slave of degree s, dual ones among them, times those of a
+master of degree m, and the products of the slave's own that make them dual, are of degree s + max(s, m) at most, 2 to 4
+of linear facets, 8 of nine-node quadrilaterals, and the points on a piece are exact for it. In the plane they are of
+degree 4 at most, for which four Gauss points (degree 7) do.
 """
 
 from __future__ import annotations
@@ -13,7 +18,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..mesh.facets import quadrature, reference_nodes, shape_functions
+from ..mesh.facets import DEGREES, quadrature, reference_nodes, shape_functions, triangle_rule
 from ..typing import Array, BoolArray, IntArray
 from .clipping import common_triangles
 from .curve import Curve
@@ -26,7 +31,7 @@ MOST_COVER = 1.0 + 1e-6
 OPPOSED = -0.1  # cosine between normals that face each other
 STEPS = 12
 CONVERGED = 1e-14  # step of a reference coordinate, of the size of facets: rounding
-FINE = 4  # Gauss points along each side of a piece where facets are distorted
+LEAST_DEGREE = 4  # the six points of lower degrees are these
 
 
 @dataclass(frozen=True)
@@ -49,7 +54,7 @@ class NodeLine:
 @dataclass(frozen=True)
 class Outlines:
     """The mesh's own facets of a master in space: corners (o, 4, 3) [m], how many (o,) each has, whether (o,) it is
-    affine, outward unit normals (o, 3), centres (o, 3) and radii (o,) [m].
+    affine, the degree (o,) of its functions, outward unit normals (o, 3), centres (o, 3) and radii (o,) [m].
 
     lots: which (q,) are within a factor of two of one size, the tree of their centres, the largest radius. One large
     facet amid small ones must not make neighbours of them all.
@@ -58,6 +63,7 @@ class Outlines:
     corners: Array
     sides: IntArray
     even: BoolArray
+    degree: IntArray
     normal: Array
     centre: Array
     radius: Array
@@ -68,7 +74,7 @@ def outlines(master: Curve | FacetSurface, current: Array) -> NodeLine | Outline
     """What slave facets are cut by on a master whose nodes are at current (k, d) [m]."""
     if isinstance(master, Curve):
         return NodeLine(current, cKDTree(current))
-    corners, sides, even = _corners(master, current)
+    corners, sides, even, degree = _corners(master, current)
     a, b, c, d = (corners[:, i] for i in range(4))
     normal = np.where((sides == 4)[:, None], np.cross(c - a, d - b), np.cross(b - a, c - a))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -77,7 +83,7 @@ def outlines(master: Curve | FacetSurface, current: Array) -> NodeLine | Outline
     level = np.floor(np.log2(np.maximum(radius / radius.max(), 1e-12)))
     lots = [np.flatnonzero(level == number) for number in np.unique(level)]
     by_size = tuple((lot, cKDTree(centre[lot]), float(radius[lot].max())) for lot in lots)
-    return Outlines(corners, sides, even, normal, centre, radius, by_size)
+    return Outlines(corners, sides, even, degree, normal, centre, radius, by_size)
 
 
 def pieces(kind: str, facets: Array, under: Array, below: NodeLine | Outlines) -> Points:
@@ -189,7 +195,12 @@ def _in_space(
     coordinates: list[Array] = []
     weights: list[Array] = []
     good = (part >= least) & (part <= MOST_COVER)
-    for lot, (at, w) in ((even, quadrature("triangle6")), (~even, _fine_triangle(FINE))):
+    own = DEGREES[kind]
+    degree = np.maximum(own + np.maximum(own, below.degree[pair_other[which]]), LEAST_DEGREE)
+    degrees = np.union1d(degree, [LEAST_DEGREE]).tolist()
+    lots = [(even & (degree == d), triangle_rule(d)) for d in degrees]
+    lots += [(~even & (degree == d), _fine_triangle(d)) for d in degrees]
+    for lot, (at, w) in lots:
         points = triangles[lot, None, 0] + at[:, :1] * first[lot, None] + at[:, 1:] * second[lot, None]
         facet = np.repeat(owner[lot], len(w))
         local, slope, found = _inverted(kind, flat, facet, points.reshape(-1, 2))
@@ -210,9 +221,13 @@ def _affine(kind: str, facets: Array) -> BoolArray:
     return np.abs(facets - straight).max(axis=(1, 2)) <= 1e-9 * size
 
 
-def _fine_triangle(count: int) -> tuple[Array, Array]:
-    """Points (q, 2) and weights (q,) on the reference triangle: Gauss points of a square, one side drawn together."""
-    x, w = np.polynomial.legendre.leggauss(count)
+def _fine_triangle(degree: int) -> tuple[Array, Array]:
+    """Points (q, 2) and weights (q,) on the reference triangle: Gauss points of a square, one side drawn together.
+
+    For facets that are distorted, where nothing is a polynomial: n along a side are exact of degree 2n − 2, and there
+    is one more than the degree on affine facets of these kinds takes.
+    """
+    x, w = np.polynomial.legendre.leggauss(-(-degree // 2) + 2)
     x, w = 0.5 * (x + 1.0), 0.5 * w
     first, second = np.meshgrid(x, x, indexing="ij")
     return np.column_stack([first.ravel(), ((1.0 - first) * second).ravel()]), (np.outer((1.0 - x) * w, w)).ravel()
@@ -229,18 +244,21 @@ def _frames(corners: Array) -> Array:
     return np.stack([first, np.cross(normal, first), normal], axis=1)
 
 
-def _corners(master: FacetSurface, current: Array) -> tuple[Array, IntArray, BoolArray]:
-    """Corners (o, 4, 3) of the mesh's own facets of a master, how many (o,) each has and whether (o,) it is affine."""
+def _corners(master: FacetSurface, current: Array) -> tuple[Array, IntArray, BoolArray, IntArray]:
+    """Corners (o, 4, 3) of the mesh's own facets of a master, how many (o,) each has, whether (o,) it is affine and the
+    degree (o,) of its functions."""
     found: list[Array] = []
     sides: list[IntArray] = []
     even: list[BoolArray] = []
+    degree: list[IntArray] = []
     for kind, block in master.blocks.items():
         count = 3 if kind.startswith("triangle") else 4
         corners = current[block[:, :count]]
         found.append(corners if count == 4 else np.concatenate([corners, corners[:, :1]], axis=1))
         sides.append(np.full(len(block), count, dtype=np.int64))
         even.append(_affine(kind, current[block]))
-    return np.concatenate(found), np.concatenate(sides), np.concatenate(even)
+        degree.append(np.full(len(block), DEGREES[kind], dtype=np.int64))
+    return np.concatenate(found), np.concatenate(sides), np.concatenate(even), np.concatenate(degree)
 
 
 def _neighbours(corners: Array, under: Array, normal: Array, below: Outlines) -> tuple[IntArray, IntArray]:

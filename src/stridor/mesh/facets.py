@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from .model import FACET_KINDS, Blocks
 from .positive_basis import changed_basis
 
 Order = list[tuple[int, int]]
+
+# Highest total degree of the shape functions of a kind: x²y² of nine nodes, x²y of eight.
+DEGREES = {"line": 1, "line3": 2, "triangle": 1, "triangle6": 2, "quad": 2, "quad8": 3, "quad9": 4}
 
 
 @dataclass(frozen=True)
@@ -63,6 +67,18 @@ def quadrature(kind: str) -> tuple[Array, Array]:
     x, w = _gauss(2 if kind == "quad" else 3)
     first, second = np.meshgrid(x, x, indexing="ij")
     return np.column_stack([first.ravel(), second.ravel()]), np.outer(w, w).ravel()
+
+
+@cache
+def triangle_rule(degree: int) -> tuple[Array, Array]:
+    """Points (q, 2) and weights (q,) on the reference triangle, all positive, exact for polynomials of a degree."""
+    if degree <= 4:
+        return quadrature("triangle6")
+    from skfem.quadrature import get_quadrature  # slow to import, and linear facets do without it
+    from skfem.refdom import RefTri
+
+    points, weights = get_quadrature(RefTri, 8 if degree == 7 else degree)  # one weight of degree 7 is negative
+    return np.asarray(points, dtype=float).T, np.asarray(weights, dtype=float)
 
 
 def facet_rule(kind: str) -> FacetRule:

@@ -23,7 +23,7 @@ from . import readers
 from .abaqus import read_abaqus
 from .boundary import require_boundary as require_boundary
 from .claims import check_claims
-from .gather import Contents, gather
+from .gather import Contents, gather, other_cells
 from .gmsh_numbers import check_numbers
 from .kinds import KINDS
 from .model import Mesh
@@ -92,7 +92,8 @@ def _through_meshio(file: Path, suffix: str, where: str) -> Any:
         elif suffix == ".msh" and "ncompatible cell data" in reason:
             reason = 'only part of its elements is in physical groups; save it from Gmsh without "Save all elements"'
         elif suffix == ".msh" and isinstance(error, KeyError):
-            reason = f"it has elements of type {error.args[0]}, which its reader does not know"
+            kind = str(error.args[0])
+            reason = f"it has elements of type {kind}, which its reader does not know{other_cells([kind])}"
         elif isinstance(error, IndexError | ValueError) and not isinstance(error, UnicodeError):
             # What Python says of a list that is too short is nothing that a user could mend.
             reason = f"it breaks off, or holds something else where numbers should be ({reason})"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,6 +17,8 @@ from .quality import turned_over
 
 # A plane mesh may be written with z that is not quite zero; over its size, less than this is rounding.
 _FLAT = 1e-9
+# Wedges and pyramids, by names of meshio's and of Abaqus's: they stand between hexahedra and tetrahedra.
+_BETWEEN = ("WEDGE", "PYRAMID", "C3D6", "C3D15", "C3D5", "C3D13")
 
 
 @dataclass(frozen=True)
@@ -108,12 +110,19 @@ def _chosen(contents: Contents, where: str, group: str | None, source: str) -> d
     return found
 
 
+def other_cells(kinds: Iterable[str]) -> str:
+    """What to take in place of wedges and pyramids, as an end of a message; "" where there are none of them."""
+    between = any(kind.upper().startswith(_BETWEEN) for kind in kinds)
+    return "; mesh the body with hexahedra alone, or with tetrahedra" if between else ""
+
+
 def _refuse_unsupported(cells: Blocks, accepted: str, where: str, source: str) -> None:
     """Refuses kinds that cannot be computed with, and bodies part plane, part solid."""
     odd = {kind: len(block) for kind, block in cells.items() if kind not in KINDS}
     if odd:
         counted = ", ".join(f"{count} {kind}" for kind, count in odd.items())
-        raise CaseError(where, source, f"has cells that cannot be computed with: {counted}; accepted: {accepted}")
+        text = f"has cells that cannot be computed with: {counted}; accepted: {accepted}{other_cells(odd)}"
+        raise CaseError(where, source, text)
     dimensions = {KINDS[kind].dimension for kind in cells}
     if len(dimensions) > 1:
         raise CaseError(where, source, "has cells in the plane and in space; choose those of the body by group")

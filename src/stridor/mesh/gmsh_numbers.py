@@ -32,6 +32,7 @@ _SPARSE = 1000
 _ALWAYS = 10_000_000
 _ENTITIES = ("point", "curve", "surface", "volume")
 _MEND = "correct the number or the lines, or save the file from Gmsh again"
+_CUT = "the file breaks off there; save it from Gmsh again"
 
 
 def check_numbers(file: Path, where: str) -> None:
@@ -41,8 +42,14 @@ def check_numbers(file: Path, where: str) -> None:
     broken otherwise is left to the reader."""
     data = file.read_bytes()
     sections = {found[1]: found.end() for found in reversed(list(_SECTION.finditer(data)))}
-    if not {b"MeshFormat", b"Nodes", b"Elements"} <= set(sections):
+    if b"$MeshFormat" not in data:
+        text = "has no $MeshFormat: it is no mesh of Gmsh's, or of a format before 2; export it from Gmsh as 4.1 or 2.2"
+        raise CaseError(where, shown_path(file), text)
+    if not {b"MeshFormat", b"Nodes"} <= set(sections):
         return
+    if b"Elements" not in sections:
+        text = "has $Nodes and no $Elements; does it break off? Save it from Gmsh again"
+        raise CaseError(where, shown_path(file), text)
     words = data[sections[b"MeshFormat"] : sections[b"MeshFormat"] + 100].split()
     if len(words) < 3:
         return
@@ -70,6 +77,12 @@ def _check_text(file: Path, data: bytes, sections: dict[bytes, int], *, old: boo
             raise CaseError(f"{file.name}, line {number + offset}", text, accepted)
 
         nodes, closed = section == b"Nodes", end >= 0
+        name = section.decode()
+        if closed and not data.startswith(b"$End" + section, end):
+            lines[-1] += data[end : end + 80].split(b"\n")[0]
+            refuse(len(lines) - 1, f"${name} has no $End{name} before this; save the file from Gmsh again")
+        if not closed and lines[-1].strip():
+            refuse(len(lines) - 1, f"the file breaks off here, without $End{name}; save it from Gmsh again")
         try:
             heads: Heads = []
             if old:
@@ -98,25 +111,23 @@ Refuse = Callable[[int, str], NoReturn]
 
 def _rows_22(lines: list[bytes], refuse: Refuse, nodes: bool, closed: bool) -> Rows:
     """Lines of a section of format 2.2 with their offsets; kind: 0. Refuses more or fewer of them than its first one
-    says, fewer only where the section is closed: the reader says that a file breaks off."""
+    says."""
     said = int(lines[0])
     rows: Rows = [(offset, line.split(), 0) for offset, line in enumerate(lines) if offset and line.strip()]
-    if len(rows) > said or (closed and len(rows) < said):
+    if len(rows) != said:
         what = "Nodes" if nodes else "Elements"
-        refuse(0, f"${what} says {said} {what.lower()}, and {len(rows)} lines follow; {_MEND}")
+        mend = _MEND if closed or len(rows) > said else _CUT
+        refuse(0, f"${what} says {said} {what.lower()}, and {len(rows)} lines follow; {mend}")
     return rows
 
 
 def _rows_41(lines: list[bytes], refuse: Refuse, nodes: bool, closed: bool) -> tuple[Rows, Heads]:
     """Numbers of nodes of format 4.1, or of elements and their nodes, with their offsets and types of elements, and the
-    heads of their blocks; none of a file that breaks off. Refuses more or fewer of them than the first line of the
-    section says."""
+    heads of their blocks. Refuses more or fewer of them than the first line of the section says."""
     held = [(offset, words) for offset, line in enumerate(lines) if (words := line.split())]
     (first, head), *follow = held
     blocks, total = int(head[0]), int(head[1])
     expected = blocks + (2 if nodes else 1) * total  # a node has a line for its number and one for its place
-    if len(follow) < expected and not closed:
-        return [], []
     for read in (_by_lines, _by_numbers):
         rows, heads = read(follow, refuse, nodes)
         if heads is not None and len(rows) == total and len(heads) == blocks:
@@ -126,7 +137,8 @@ def _rows_41(lines: list[bytes], refuse: Refuse, nodes: bool, closed: bool) -> t
         ends = f"which are {expected} lines, and {len(follow)} lines follow"
     else:
         ends = "which the counts of its blocks do not make up"
-    refuse(first, f"${what} says {total} {what.lower()} in {blocks} blocks, {ends}; {_MEND}")
+    mend = _MEND if closed or len(follow) >= expected else _CUT
+    refuse(first, f"${what} says {total} {what.lower()} in {blocks} blocks, {ends}; {mend}")
 
 
 def _by_lines(held: list[tuple[int, list[bytes]]], refuse: Refuse, nodes: bool) -> tuple[Rows, Heads | None]:
@@ -246,7 +258,9 @@ def _check_binary(file: Path, where: str, data: bytes, sections: dict[bytes, int
     elif unique[0] < 1 or unique[-1] > _LARGEST:
         text = f"has a node of number {unique[0] if unique[0] < 1 else unique[-1]}; they are numbered from 1"
     elif len(unique) < len(nodes):
-        text = f"has {len(nodes) - len(unique)} nodes whose number another one has"
+        again = np.sort(nodes)
+        first = again[1:][again[1:] == again[:-1]][0]
+        text = f"has {len(nodes) - len(unique)} nodes whose number another one has; the first is node {first}"
     elif unique[-1] > max(_ALWAYS, _SPARSE * len(unique)):
         text = f"has node {unique[-1]} among {len(unique)} nodes: number them closer to one another"
     else:
@@ -273,6 +287,8 @@ def _binary_count(data: bytes, at: int, what: str, said: int, found: int) -> str
     mend = "save it from Gmsh again"
     if found != said:
         return f"says {said} {what.lower()} at ${what}, and its blocks hold {found}; {mend}"
+    if not data[at:].strip():
+        return f"breaks off after its {said} {what.lower()}, before $End{what}; {mend}"
     if not data[at : at + 64].lstrip().startswith(b"$"):
         return f"says {said} {what.lower()} at ${what}, and holds more before the section ends; {mend}"
     return ""

@@ -111,7 +111,9 @@ def _missing(block: IntArray, count: int, where: str, what: str) -> list[Problem
 
 
 def _cell_problems(mesh: Mesh, where: str) -> list[Problem]:
-    """Inverted and degenerate cells: how many, and the first."""
+    """Cells with a node twice, inverted and degenerate ones: how many, and the first."""
+    if twice := _twice_problems(mesh, where):
+        return twice  # which are also inverted or degenerate, as a rule
     inverted, degenerate, whole = 0, 0, 0
     first: dict[str, tuple[str, int, Array]] = {}
     for kind, block in mesh.cells.items():
@@ -138,6 +140,26 @@ def _cell_problems(mesh: Mesh, where: str) -> list[Problem]:
         problems.append(Problem(where, None, f"{text}; {_first(*first['degenerate'])}"))
     problems += _duplicate_problems(mesh, where)
     return problems or _overlap_problems(mesh, where)
+
+
+def _twice_problems(mesh: Mesh, where: str) -> list[Problem]:
+    """Cells that name one of their nodes twice: no cell is drawn together to one with fewer corners."""
+    count, first = 0, ""
+    for kind, block in mesh.cells.items():
+        ordered = np.sort(block, axis=1)
+        again = ordered[:, 1:] == ordered[:, :-1]
+        found = np.flatnonzero(again.any(axis=1))
+        count += len(found)
+        if len(found) and not first:
+            cell = int(found[0])
+            node = int(ordered[cell, 1:][again[cell]][0])
+            named = "the node" if mesh.numbers is None else f"node {mesh.numbers[node]},"
+            centre = mesh.points[block[cell, : KINDS[kind].corners]].mean(axis=0)
+            first = f"{_first(kind, cell, centre)}, with {named} at {_coordinates(mesh.points[node])}"
+    if not count:
+        return []
+    text = f"{count} of {mesh.cell_count} cells name a node twice; {first}; every node of a cell is one of its own"
+    return [Problem(where, None, text)]
 
 
 def _duplicate_problems(mesh: Mesh, where: str) -> list[Problem]:

@@ -17,6 +17,8 @@ from ..contact.multipliers import OPEN, SLIP
 from ..contact.nodes import ContactNodes
 from ..direct import SingularMatrix
 from ..errors import AnalysisError, NotSlidingError
+from ..mesh.model import Mesh
+from ..mesh.quality import pieces
 from ..stages import passing, stage
 from ..system import System
 from ..typing import Array, BoolArray, IntArray, Sparse
@@ -384,9 +386,20 @@ def _loose(system: System, nodes: ContactNodes, motion: Array | None, *, far: bo
         return f"steady sliding cannot be told: {moved.apart or _balanced(moved.who)}"
     who = "the structure" if moved is None else moved.who
     return (
-        f"steady sliding has no equilibrium: {who} can move freely under the loads; fix a freedom of the loose "
-        "body, or turn the load so that it presses the bodies together"
+        f"steady sliding has no equilibrium: {who} can move freely under the loads{_parts(system, who)}; fix a "
+        "freedom of the loose body, or turn the load so that it presses the bodies together"
     )
+
+
+def _parts(system: System, who: str) -> str:
+    """What to add where a body's mesh does not hang together: one part may be held and another one not."""
+    for solid in system.solids:
+        if solid.cells and who == f"body {solid.name}" and (count := pieces(Mesh(solid.points, solid.cells))) > 1:
+            return (
+                f": its mesh has {count} pieces that share no node, each of which a tie, a spring or a support must "
+                "hold (of a file with several bodies take one by its group)"
+            )
+    return ""
 
 
 def _moved_most(system: System, size: Array) -> str:
