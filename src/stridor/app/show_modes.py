@@ -108,7 +108,7 @@ def show_onsets(result: Onsets) -> None:
         if "κ [1/s]" not in gone:
             stdout.print("κ: growth opens as κ √(μ − μ_c) without damping")
         if "slope [1/s]" not in gone:
-            stdout.print("slope: d growth/dμ at a damped onset")
+            stdout.print("slope: d growth/dμ at an onset, where it is finite")
         for line in result.from_above_words:
             stdout.print(line)
     if result.outside:
