@@ -314,9 +314,9 @@ def relative_coefficients(law: FrictionLaw, speeds: Array, speed: float) -> Arra
     """μ(v)/μ(v̄) (k,) at slip speeds v (k,) [m/s] of a law scaled at the speed v̄: what it has there of the coefficient
     that it was scaled to. 1 where v is v̄ to rounding, and of a law that no factor scales."""
     found = np.ones(len(speeds))
-    if law.constant or _factor(1.0, at := law.sliding(speed)) is None:
-        return found
     other = np.flatnonzero(np.abs(speeds - speed) > SAME_SPEED * speed)
+    if not len(other) or law.constant or _factor(1.0, at := law.sliding(speed)) is None:
+        return found
     values, which = np.unique(speeds[other], return_inverse=True)
     found[other] = np.array([law.sliding(float(v)) / at for v in values])[which]
     return found
