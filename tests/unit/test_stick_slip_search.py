@@ -12,6 +12,7 @@ import pytest
 import scipy.sparse as sp
 
 from stridor.contact.multipliers import OPEN, SLIP, STICK
+from stridor.contact.nodes import ContactNodes
 from stridor.direct import SingularMatrix
 from stridor.errors import AnalysisError
 from stridor.laws import Coulomb, StaticKinetic, Weakening
@@ -261,18 +262,16 @@ def test_an_open_node_that_stays_open_is_no_change() -> None:
 # -- what an increment brings ------------------------------------------------------------------------------------------
 
 
-def plate(m: int = 4) -> Any:
-    """Nodes of two contacts; two motions, of which the second turns about node 0."""
+def plate(m: int = 4) -> ContactNodes:
+    """Nodes of two contacts; two motions, of which the second turns about node 0, at 2 rad/s in steady sliding."""
     owner = np.arange(m) // 2
     lift = np.zeros((2 * m, 2))
     lift[0::2, 0] = 1.0
     lift[1::2, 1] = np.arange(m)
-    return SimpleNamespace(
-        count=m, directions=2, owner=owner, share=np.ones(m), laws=(Weakening(0.2, 0.6, 0.5), StaticKinetic(0.3, 0.45)),
-        slip_velocity=lambda v: (lift @ v).reshape(m, 2),
-        friction_coefficients=lambda speed: np.array(
-            [(Weakening(0.2, 0.6, 0.5), StaticKinetic(0.3, 0.45))[k].sliding(v) for k, v in zip(owner, speed, strict=True)]
-        ),
+    return ContactNodes(
+        ("weak", "plain"), owner, (Weakening(0.2, 0.6, 0.5), StaticKinetic(0.3, 0.45)), sp.csr_array((m, 0)),
+        sp.csr_array((2 * m, 0)), np.zeros((m, 2)), lift, np.zeros(m), np.ones(m), np.zeros(m), np.zeros((m, 3)),
+        np.zeros((m, 3)), np.zeros((m, 2, 3)), speed=2.0 * np.arange(m), mean_speed=(1.0, 5.0),
     )  # fmt: skip
 
 
@@ -325,15 +324,17 @@ def test_motions_that_end_drive_nothing_and_have_no_damping() -> None:
 
 
 def test_friction_asked_for_scales_the_limit_of_sticking_with_it() -> None:
-    nodes = plate()
-    nodes.laws = (Weakening(0.2, 0.6, 0.5), Weakening(0.6, 0.2, 0.5))  # the second rises with speed
+    """Each law once, at its contact's mean speed in steady sliding, whatever the speeds of a step are."""
+    laws = (Weakening(0.2, 0.6, 0.5), Weakening(0.6, 0.2, 0.5))  # the second rises with speed
+    nodes = replace(plate(), laws=laws)
     speed = np.array([0.0, 0.5, 0.0, 0.5])
     mu, sticking = history._coefficients(nodes, speed, 0.4)
-    assert mu == pytest.approx([0.4] * 4)
+    first, second = 0.4 / (0.2 + 0.4 * np.exp(-2.0)), 0.4 / (0.6 - 0.4 * np.exp(-10.0))
     fallen, risen = 0.2 + 0.4 / np.e, 0.6 - 0.4 / np.e
-    assert sticking == pytest.approx([0.4, 0.4 * 0.6 / fallen, 0.4, max(0.4, 0.4 * 0.2 / risen)])
-    nodes.laws = (Coulomb(0.1), Coulomb(0.2))
-    assert history._coefficients(nodes, speed, 0.7)[1] == pytest.approx([0.7] * 4)
+    assert mu == pytest.approx([first * 0.6, first * fallen, second * 0.2, second * risen])
+    assert sticking == pytest.approx([first * 0.6, first * 0.6, second * 0.2, second * risen])
+    plain = replace(nodes, laws=(Coulomb(0.1), Coulomb(0.2)))
+    assert history._coefficients(plain, speed, 0.7)[1] == pytest.approx([0.7] * 4)
 
 
 def test_the_way_through_the_steps_is_told_where_it_ends(monkeypatch) -> None:
@@ -367,7 +368,8 @@ def test_the_way_through_the_steps_is_told_where_it_ends(monkeypatch) -> None:
     assert found.state.travel == pytest.approx([6.0, 6.0])
     assert (found.residual, found.solved) == (0.4, 17)
     assert found.slip == pytest.approx(np.array([[0, 0], [0, 2], [0, 4], [0, 6]]))
-    assert found.load.mu == pytest.approx([0.2] * 4)
+    weak = Weakening(0.2, 0.6, 0.5)
+    assert found.load.mu == pytest.approx(0.2 * np.array([0.6 / weak.sliding(1.0), weak.sliding(2.0) / weak.sliding(1.0), 1, 1]))
     for at, words in ((2, "step 1, increment 2 of 3"), (5, "step 2, increment 2 of 2")):
         asked.clear()
         fails = {at: AnalysisError("what")}

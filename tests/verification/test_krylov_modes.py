@@ -16,6 +16,7 @@ from stridor.case import template_text
 from stridor.contact.nodes import ContactNodes
 from stridor.errors import AnalysisError, CaseError, FollowingError
 from stridor.laws import Coulomb, Weakening
+from stridor.laws.friction import FrictionLaw
 from stridor.modal.complex_modes import complex_modes
 from stridor.modal.krylov import (
     Options,
@@ -31,7 +32,7 @@ from stridor.modal.krylov.passages import crossings
 from stridor.modal.krylov.problem import Varying, problem_of
 from stridor.modal.krylov.reduced import Eigenpairs
 from stridor.modal.onsets import onsets
-from stridor.sliding import friction_damping_matrix, steady_sliding
+from stridor.sliding import SteadySliding, friction_damping_matrix, steady_sliding
 from stridor.system import System, build_system
 from stridor.system.model import PrescribedMotion
 
@@ -87,13 +88,13 @@ def scattered(dimension=2, compliance=0.0, damping=0.0, *, size=90, nodes=7, see
     return assembled(mass, rate, stiffness, rows[:, 0], tangent, compliance, slip, **more)
 
 
-def eliminated(system: System, mu: float, damping=0.0, stiffness=0.0) -> np.ndarray:
+def eliminated(system: System, mu: float | np.ndarray, damping=0.0, stiffness=0.0) -> np.ndarray:
     """Eigenvalues with Im λ ≥ 0 by dense elimination: contact springs put into K, rigid contact eliminated, which puts
-    friction into M, C and K."""
+    friction into M, C and K. mu: of all nodes, or of each (m,)."""
     nodes = system.contact_nodes()
     slip = nodes.slip_velocity(np.ones(1))
     normal = nodes.normal.toarray()
-    push = normal - mu * nodes.along(slip / np.linalg.norm(slip, axis=1, keepdims=True)).toarray()
+    push = normal - np.reshape(mu, (-1, 1)) * nodes.along(slip / np.linalg.norm(slip, axis=1, keepdims=True)).toarray()
     mass, rate, spring = (a.toarray() for a in (system.mass, system.damping, system.stiffness))
     rate, spring = rate + damping, spring + stiffness
     soft = nodes.compliance > 0
@@ -390,26 +391,33 @@ def pressed(**more) -> System:
     return replace(system, loads={"press": -(normal.T @ np.array([3.0, 2.0, 4.0]))})
 
 
+def scaled_law(steady: SteadySliding, mu: float) -> FrictionLaw:
+    """That of the pad with μ at its mean slip speed."""
+    return Weakening(0.2, 0.4, 1.0).scaled(mu, float(steady.slip_speed.mean()))
+
+
 def test_falling_friction_and_turning_friction_are_in_the_equations():
     system = pressed(law=Weakening(0.2, 0.4, 1.0))
     mu = 0.3
     steady = steady_sliding(system, mu=mu)
     assert steady.active.all()
     whole = friction_damping_matrix(system, steady).toarray()
-    slopes = [Weakening(0.2, 0.4, 1.0).scaled(mu, float(v)).slope(float(v)) for v in steady.slip_speed]
+    law = scaled_law(steady, mu)
+    slopes, own = (np.array([of(float(v)) for v in steady.slip_speed]) for of in (law.slope, law.sliding))
     along = system.contact_nodes().along(steady.sense).toarray()
     weakening = along.T @ ((steady.normal_force * slopes)[:, None] * along)
     for options, added in ((Options(), weakening), (Options(friction_damping=True), whole)):
         modes = krylov_modes(system, mu, count=8, options=options)
         assert modes.residual.max() < 1e-8
-        assert distance_to(modes.eigenvalues[0], eliminated(system, mu, damping=added)).max() < 1e-8
-        assert distance_to(modes.eigenvalues[0], eliminated(system, mu)).max() > 1e-5
+        assert distance_to(modes.eigenvalues[0], eliminated(system, own, damping=added)).max() < 1e-8
+        assert distance_to(modes.eigenvalues[0], eliminated(system, own)).max() > 1e-5
 
 
 def test_power_of_the_slope_of_a_law_is_that_of_its_node_whether_friction_turns_or_not():
     system, mu = pressed(law=Weakening(0.2, 0.4, 1.0)), 0.3
     steady = steady_sliding(system, mu=mu)
-    slopes = [Weakening(0.2, 0.4, 1.0).scaled(mu, float(v)).slope(float(v)) for v in steady.slip_speed]
+    law = scaled_law(steady, mu)
+    slopes, own = (np.array([of(float(v)) for v in steady.slip_speed]) for of in (law.slope, law.sliding))
     nodes = system.contact_nodes()
     for options in (Options(), Options(friction_damping=True)):
         modes = krylov_modes(system, mu, count=8, vectors=True, options=options)
@@ -420,10 +428,10 @@ def test_power_of_the_slope_of_a_law_is_that_of_its_node_whether_friction_turns_
                 modes.right[0, mode],
             )
             slip, gap = nodes.along(steady.sense) @ u, nodes.normal @ u
-            power = np.conj(lam * slip) * (-mu * gap / nodes.compliance - steady.normal_force * slopes * lam * slip)
+            power = np.conj(lam * slip) * (-own * gap / nodes.compliance - steady.normal_force * slopes * lam * slip)
             assert energy.power / energy.power[0] == pytest.approx(power.real / power.real[0], rel=1e-6)
             assert energy.power.sum() - energy.damping == pytest.approx(2 * lam.real, abs=1e-7 * abs(lam))
-            without = np.conj(lam * slip) * (-mu * gap / nodes.compliance)
+            without = np.conj(lam * slip) * (-own * gap / nodes.compliance)
             assert np.abs(power.real / power.real[0] - without.real / without.real[0]).max() > 1e-4
 
 

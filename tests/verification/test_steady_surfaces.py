@@ -455,8 +455,8 @@ def test_damping_of_friction_is_the_derivative_of_the_friction_force():
         def force(velocity, nodes=nodes, steady=steady, mu=mu):
             w = steady.slip_velocity + (nodes.tangent @ velocity).reshape(-1, 2)
             speed = np.linalg.norm(w, axis=1)
-            laws = [law if mu is None else law.scaled(mu, v) for v in steady.slip_speed]
-            coefficient = np.array([one.sliding(v) for one, v in zip(laws, speed, strict=True)])
+            scaled = law if mu is None else law.scaled(mu, float(steady.slip_speed.mean()))
+            coefficient = np.array([scaled.sliding(v) for v in speed])
             return nodes.tangent.T @ (-(coefficient * steady.normal_force / speed)[:, None] * w).ravel()
 
         step = 1e-6

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
 
-from ..laws.friction import FrictionLaw, share_of, slope_at
+from ..laws.friction import FrictionLaw, relative_coefficients, share_of, slope_at
 from ..typing import Array, BoolArray, IntArray, Sparse
 
 
@@ -29,6 +30,10 @@ class ContactNodes:
     the normal force, p = δ/compliance + cubic δ³, zero where left out and where contact is rigid. position (m, d) [m],
     normals (m, d), tangents (m, d−1, d). closed: for each contact whether it is kept closed; () where none is. Where
     it pulls, p has the sign of δ.
+
+    A friction coefficient μ that is asked for of all contacts is that of each contact at its mean slip speed v̄ in
+    steady sliding, to which its law is scaled as a whole: a node that slips at v has μ·μ(v)/μ(v̄). speed (m,) [m/s]: of
+    the nodes in steady sliding, mean_speed: v̄ of each contact; () where nobody asks for such a μ.
     """
 
     names: tuple[str, ...]
@@ -46,10 +51,14 @@ class ContactNodes:
     tangents: Array
     cubic: Array = None  # type: ignore[assignment]  # ty: ignore[invalid-assignment]  # filled in __post_init__
     closed: tuple[bool, ...] = ()
+    speed: Array = None  # type: ignore[assignment]  # ty: ignore[invalid-assignment]  # filled in __post_init__
+    mean_speed: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if self.cubic is None:  # pyright: ignore[reportUnnecessaryComparison]
             object.__setattr__(self, "cubic", np.zeros(len(self.gap)))
+        if self.speed is None:  # pyright: ignore[reportUnnecessaryComparison]
+            object.__setattr__(self, "speed", np.zeros(len(self.gap)))
 
     @property
     def kept(self) -> BoolArray:
@@ -58,8 +67,39 @@ class ContactNodes:
 
     @property
     def share(self) -> Array:
-        """The part (m,) of a friction coefficient asked for of all contacts that each node gets, 0 without friction."""
+        """The part (m,) of a friction coefficient asked for of all contacts that each node gets in steady sliding, 0
+        without friction."""
+        return self.coefficients(1.0, self.speed)
+
+    @cached_property
+    def relative(self) -> Array:
+        """The part (m,) of its contact's coefficient that each node has in steady sliding, μ(v)/μ(v̄)."""
+        return self._relative(self.speed)
+
+    @property
+    def rubs(self) -> BoolArray:
+        """Nodes (m,) of contacts that get a part of a friction coefficient asked for of all contacts."""
+        return self._common > 0.0
+
+    @property
+    def _common(self) -> Array:
         return np.array([share_of(law) for law in self.laws], dtype=float)[self.owner]
+
+    def _relative(self, speeds: Array) -> Array:
+        found = np.ones(self.count)
+        for k, (law, mean) in enumerate(zip(self.laws, self.mean_speed, strict=False)):
+            mine = np.flatnonzero(self.owner == k)
+            found[mine] = relative_coefficients(law, speeds[mine], mean)
+        return found
+
+    def coefficients(self, mu: float, speeds: Array) -> Array:
+        """Friction coefficients (m,) at slip speeds (m,) [m/s] where ``mu`` is asked for of all contacts."""
+        steady = np.array_equal(speeds, self.speed)
+        return float(mu) * self._common * (self.relative if steady else self._relative(speeds))
+
+    def laws_at(self, mu: float) -> tuple[FrictionLaw, ...]:
+        """The law of each contact, scaled to ``mu`` at its mean slip speed in steady sliding."""
+        return tuple(law.scaled(float(mu), v) for law, v in zip(self.laws, self.mean_speed, strict=True))
 
     @property
     def count(self) -> int:
@@ -130,6 +170,7 @@ class ContactNodes:
             normals=self.normals[index],
             tangents=self.tangents[index],
             cubic=self.cubic[index],
+            speed=self.speed[index],
         )
 
 

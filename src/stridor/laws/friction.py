@@ -16,6 +16,8 @@ import numpy as np
 from ..typing import Array
 from .packed import CONSTANT, CUBIC, EXPONENTIAL, HEAD, HYPERBOLIC, LINEAR, coefficient_at, monotone_slopes
 
+SAME_SPEED = 1e-12  # relative: slip speeds that are one but for rounding
+
 
 class FrictionLaw(Protocol):
     """What every friction law answers. Speeds are slip speeds [m/s]; only their magnitude counts."""
@@ -306,6 +308,18 @@ def slope_at(law: FrictionLaw, coefficient: float, speed: float) -> float:
     one, whichever share that is of a coefficient asked for of all contacts."""
     own = own_law(law)
     return own.slope(speed) if own.sliding(speed) == coefficient else own.scaled(coefficient, speed).slope(speed)
+
+
+def relative_coefficients(law: FrictionLaw, speeds: Array, speed: float) -> Array:
+    """μ(v)/μ(v̄) (k,) at slip speeds v (k,) [m/s] of a law scaled at the speed v̄: what it has there of the coefficient
+    that it was scaled to. 1 where v is v̄ to rounding, and of a law that no factor scales."""
+    found = np.ones(len(speeds))
+    other = np.flatnonzero(np.abs(speeds - speed) > SAME_SPEED * speed)
+    if not len(other) or law.constant or _factor(1.0, at := law.sliding(speed)) is None:
+        return found
+    values, which = np.unique(speeds[other], return_inverse=True)
+    found[other] = np.array([law.sliding(float(v)) / at for v in values])[which]
+    return found
 
 
 def is_zero(law: FrictionLaw) -> bool:

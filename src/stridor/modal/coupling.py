@@ -20,7 +20,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import AnalysisError
-from ..laws.friction import share_of, slope_at
+from ..laws.friction import slope_at
 from ..sliding import (
     anything_acts,
     force_rates,
@@ -79,8 +79,9 @@ class PointCoupling:
     def _slopes(self, mu: float) -> Array:
         """dμ/d|v| (m,) [s/m] of the laws, each with its share of ``mu``."""
         speeds = np.abs(self.slip_speed)
+        own = mu * self.system.contact_nodes().share[: self.contacts]
         laws = [c.law for c in self.system.contacts]
-        return np.array([slope_at(law, share_of(law) * mu, float(v)) for law, v in zip(laws, speeds, strict=True)])
+        return np.array([slope_at(law, float(at), float(v)) for law, at, v in zip(laws, own, speeds, strict=True)])
 
     def _forces(self, mu: float) -> tuple[Array, Array]:
         """|N| (m,) and its derivative in μ."""
@@ -170,7 +171,7 @@ def couple(system: System, *, mu: float | None = None) -> tuple[PointCoupling, t
         raise AnalysisError(
             "a friction law with a slope needs the normal force: give the case a load that presses the bodies"
         )
-    share = np.array([share_of(c.law) for c in system.contacts])
+    share = system.contact_nodes().share[: len(system.contacts)]
     still = [c.name for c, v, own in zip(system.contacts, speeds, share, strict=True) if v == 0.0 and own]
     if still:
         raise AnalysisError(

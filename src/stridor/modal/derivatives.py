@@ -162,7 +162,7 @@ def by_friction(
         return PencilChange(push=rows.slide)
     # Its own coefficient, whichever share of a common one it gets: one without friction may be given some.
     mine = np.zeros(rows.slip.shape[0])
-    mine[: chosen.count] = chosen.owner == nodes.names.index(contact)
+    mine[: chosen.count] = chosen.relative * (chosen.owner == nodes.names.index(contact))
     return PencilChange(push=sp.csr_array(sp.diags_array(mine) @ rows.slip))
 
 

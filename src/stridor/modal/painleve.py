@@ -19,7 +19,6 @@ from scipy.sparse.csgraph import connected_components
 from ..direct import factorise
 from ..direct.factor import BLOCK
 from ..errors import AnalysisError
-from ..sliding import full_motion
 from ..system import System
 from ..typing import Array, IntArray, Sparse
 from .krylov.steady import TouchingNodes, contact_rows, touching_nodes
@@ -64,8 +63,8 @@ def steps_undetermined(system: System, mu: float | None, options: Options) -> st
     """What is to be said of a run in time with rigid contact that does not determine steady sliding at ``mu`` (None:
     the laws' own friction), "" of others."""
     nodes = system.contact_nodes()
-    own = nodes.friction_coefficients(np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1))
-    rubs = own[nodes.share > 0.0]
+    own = nodes.friction_coefficients(nodes.speed)
+    rubs = own[nodes.rubs]
     if mu is None and len(rubs) and np.ptp(rubs) <= SAME * rubs.max():
         mu = float(rubs[0])
     if mu is not None:

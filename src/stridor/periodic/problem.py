@@ -17,7 +17,6 @@ from ..temporal.steppers.exact.drive import Piece
 from ..temporal.steppers.exact.statuses import BACKWARD, FORWARD, GAP, Pairs, Status
 from ..temporal.steppers.exact.stepper import coordinates_of, pairs_of, why_not_exact
 from ..temporal.steppers.exact.varied import VariedMotion
-from ..temporal.steppers.friction import frictional
 from ..typing import Array
 
 HORIZON = 1e9  # rad of the slowest mode: longer than a motion is ever followed
@@ -92,7 +91,7 @@ class Family:
         if not mu >= 0.0:
             raise AnalysisError(f"μ = {mu:g} is no friction coefficient")
         refuse_undetermined(system, mu, Options(), touching_at=mu)
-        scaled = frictional(system, mu, full_motion(system))
+        scaled = system.at_friction(mu)
         pairs = pairs_of(scaled, basis)
         motion = system.motion
         squares = np.abs(basis.stiffness)
@@ -136,7 +135,7 @@ def why_not_shooting(system: System, cutoff_hz: float | None = None) -> str:
         why = "nothing slides: no support has a velocity"
     if not why:
         nodes = system.contact_nodes()
-        still = (nodes.share == 0.0) & (slip_of(system) == 0.0)
+        still = ~nodes.rubs & (slip_of(system) == 0.0)
         if still.any():
             name = nodes.names[nodes.owner[int(np.argmax(still))]]
             why = f"contact {name} has no friction and nothing slides it, so that each of its swings is a reversal"

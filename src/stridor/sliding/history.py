@@ -82,16 +82,12 @@ def _loading(
 
 
 def _coefficients(nodes: ContactNodes, speed: Array, mu: float | None) -> tuple[Array, Array]:
-    """Friction coefficients (m,) of slip and at which sticking ends."""
-    sliding = nodes.friction_coefficients(speed) if mu is None else float(mu) * nodes.share
-    sticking = np.empty(nodes.count)
-    for k, law in enumerate(nodes.laws):
-        mine = np.flatnonzero(nodes.owner == k)
-        speeds, which = np.unique(speed[mine], return_inverse=True)
-        laws = [law if mu is None else law.scaled(float(mu), float(v)) for v in speeds]
-        limits = np.array([max(used.sticking, used.sliding(float(v))) for used, v in zip(laws, speeds, strict=True)])
-        sticking[mine] = limits[which]
-    return sliding, sticking
+    """Friction coefficients (m,) of slip and at which sticking ends, at the slip speeds (m,) of a step. With a μ each
+    law is scaled once, at its contact's mean speed in steady sliding: slower steps have what it gives there."""
+    sliding = nodes.friction_coefficients(speed) if mu is None else nodes.coefficients(mu, speed)
+    laws = nodes.laws if mu is None else nodes.laws_at(mu)
+    sticks = np.array([law.sticking for law in laws], dtype=float)[nodes.owner]
+    return sliding, np.maximum(sticks, sliding)
 
 
 def _unheld(system: System, nodes: ContactNodes, where: str, motion: Array | None) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..system import System
+from ..system.load_steps import running_on
 from ..typing import Array
 
 LEAST = 0.2  # of the speeds: a mean velocity below that is no direction (a whole turning ring)
@@ -28,10 +29,7 @@ def mean_direction(slip: Array) -> Array | None:
 def full_motion(system: System) -> Array:
     """Factors (p,) of the moving supports in steady sliding: one, or those that run on after the last load step; zero
     for those that are pressed away by a distance."""
-    if system.load_steps:
-        last = system.load_steps[-1]
-        return np.zeros_like(last.velocities) if last.duration is not None else last.velocities
-    return system.motion.full
+    return running_on(system.load_steps, system.motion)
 
 
 def external_force(system: System, load_factors: Mapping[str, float] | None) -> Array:

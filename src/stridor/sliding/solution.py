@@ -55,11 +55,11 @@ def steady_sliding(
 ) -> SteadySliding:
     """Solve the steady sliding equilibrium of every contact, over points and over surfaces.
 
-    mu replaces the friction coefficient of every contact; load_factors default to one for every load,
-    motion_factors (p,) to one for every support. guess (m,): nodes that are likely to touch, as `active` of a
-    solution at another coefficient, which saves most of the steps. held (m,): the nodes that touch, whichever the signs
-    of their forces and of the others' gaps: what small motions about another μ hold, smooth in μ. solver is that of
-    `direct.factorise`.
+    mu replaces the friction coefficient of every contact, at its mean slip speed (`ContactNodes`); load_factors
+    default to one for every load, motion_factors (p,) to one for every support. guess (m,): nodes that are likely to
+    touch, as `active` of a solution at another coefficient, which saves most of the steps. held (m,): the nodes that
+    touch, whichever the signs of their forces and of the others' gaps: what small motions about another μ hold, smooth
+    in μ. solver is that of `direct.factorise`.
     A system with load steps is taken through them, and factors can only be those of the last. Raises AnalysisError
     where a contact does not slide or would change its gap, where no contact carries load, and where the structure is
     not held.
@@ -74,7 +74,7 @@ def steady_sliding(
     slip = nodes.slip_velocity(factors)
     speed = np.linalg.norm(slip, axis=1)
     _require_constant_gap(nodes, factors, speed)
-    coefficient = nodes.friction_coefficients(speed) if mu is None else float(mu) * nodes.share
+    coefficient = nodes.friction_coefficients(speed) if mu is None else nodes.coefficients(mu, speed)
     slips = speed > STILL * float(speed.max(initial=0.0))
     if not slips.any():
         try:

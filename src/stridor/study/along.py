@@ -31,16 +31,30 @@ def onsets_along(
 
     name: its path in the case, or a parameter of its matrices; mu is the friction coefficient. said: what the range is
     called in messages (default: friction_range for mu, else the range of that number). Raises CaseError for a number
-    that there is not or that has no range; AnalysisError where there is no steady sliding in all of it.
+    that there is not or that has no range; AnalysisError where there is no steady sliding in all of it, and for a case
+    with load steps.
     """
     started = time.perf_counter()
     if (steps := name.split("."))[0] == "parameters" and len(steps) == 3 and steps[1] in case.parameters:
         raise CaseError("along", name, f"call it {steps[1]}")
     chosen = _range(case, name, between, said or ("friction_range" if name == MU else f"range of {name}"))
     require_frequency(max_frequency_hz)
+    _refuse_load_steps(case, name)
     found = _in_stretches(case, name, chosen, max_frequency_hz, solver)
     found.provenance = provenance(case, "onsets along", time.perf_counter() - started, along=name)
     return found
+
+
+def _refuse_load_steps(case: Case, name: str) -> None:
+    """Raise AnalysisError where load steps leave contact in another state at every value of a number."""
+    if case.steady.friction != "stick-slip":
+        return
+    path = f"parameters.{name}.value" if name in case.parameters else name
+    raise AnalysisError(
+        f'onsets along {name} (--along): load steps (steady.friction = "stick-slip") leave nodes that stick and slip '
+        "at each value in a way of its own, which is not followed along a number; take `stridor modes` at one value "
+        f"after another (--set {path}=VALUE), or `onsets` over μ, without --along"
+    )
 
 
 def _in_stretches(

@@ -169,7 +169,7 @@ def _modes(
 
 def _own(work: Workspace) -> tuple[float, System | None]:
     """The friction coefficient of all contacts, or where the case gives them different ones the largest, and the system
-    in which each has its own at it. Raises CaseError where contacts have several, by their laws."""
+    in which each has its own at it."""
     found = None
     if work.own_friction is None and not work.varies:
         found = work.system().once("in proportion", lambda: in_proportion(work.system()))
@@ -177,7 +177,7 @@ def _own(work: Workspace) -> tuple[float, System | None]:
 
 
 def _said_of_own(work: Workspace) -> tuple[str, ...]:
-    own = frictions_by_contact(work.system()) or {}
+    own = frictions_by_contact(work.system())
     given = ", ".join(f"{name} {value:g}" for name, value in own.items())
     return (f"each contact has its own friction coefficient ({given}); the μ that is named is the largest",)
 

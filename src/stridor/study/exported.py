@@ -238,7 +238,7 @@ def _pulls(system: System, mu: float | None, contact: ContactProblem, options: O
 def _tangent(system: System, contact: ContactProblem, pulls: BoolArray) -> Sparse:
     """Rows (m, n) of the touching nodes along their slip, of those without friction too."""
     nodes = system.contact_nodes().select(contact.touching)
-    without = nodes.share == 0.0
+    without = ~nodes.rubs
     # The problem's own rows are those that friction goes along with the force as it is: against the slip where it
     # pushes, with the slip where it pulls.
     sign = np.where(without, 0.0, np.where(pulls, 1.0, -1.0))
@@ -255,8 +255,7 @@ def _contact_rows(system: System, contact: ContactProblem, pulls: BoolArray) -> 
     nodes = system.contact_nodes().select(contact.touching)
     if not nodes.count:
         return ()
-    speeds = np.linalg.norm(nodes.slip_velocity(system.motion.full), axis=1)
-    coefficients = nodes.friction_coefficients(speeds)
+    coefficients = nodes.friction_coefficients(nodes.speed)
     with np.errstate(divide="ignore"):
         stiffness: Array = 1.0 / contact.compliance[: nodes.count]
     return tuple(

@@ -103,4 +103,5 @@ def _chamfered(linear: Linearised, measure: Measure) -> System:
         replace(surface, nodes=surface.nodes.select(~gone[mine]), facets=None)
         for surface, mine in system.nodes_of_surfaces()
     ]
-    return replace(system, surfaces=tuple(surfaces))
+    speeds = dict(zip(nodes.names, nodes.mean_speed, strict=True))  # at which μ is told, as it was
+    return replace(system, surfaces=tuple(surfaces), friction_speeds=speeds)

@@ -46,7 +46,7 @@ from .analyses import modes as modes_at
 from .asked import names_of, require_band, require_friction
 from .provenance import provenance
 from .sensitivity_result import Sensitivities
-from .workspace import Problem, Workspace, different_friction, friction_in_sliding, frictions_in_sliding
+from .workspace import Problem, Workspace, different_friction, friction_in_sliding, frictions_by_contact
 
 SHAPE_STEP = 1e-5  # of the size of bodies: by how much what says where nodes lie is moved
 NEAR = 0.05  # relative change of a number within which an exceptional point is told of
@@ -271,7 +271,7 @@ class Linearised:
         def at(value: float) -> Pencil:
             system = self.varied(path, value)
             if self.by_law:
-                moved.append(frictions_in_sliding(system))
+                moved.append(np.array(list(frictions_by_contact(system).values())))
                 apart.append(friction_in_sliding(system) is None)
             return pencil_of(system, self.friction(system), self.held, self.options)
 
@@ -322,7 +322,7 @@ class Linearised:
     def _without(self, contact: str) -> bool:
         """Whether a contact has no friction at any μ."""
         nodes = self.system.contact_nodes()
-        return bool(np.all(nodes.share[nodes.owner == nodes.names.index(contact)] == 0.0))
+        return not np.any(nodes.rubs[nodes.owner == nodes.names.index(contact)])
 
     def _is_friction(self, path: str) -> bool:
         """Whether a number of a contact is its friction coefficient: of a law of speed it is but one of its numbers."""

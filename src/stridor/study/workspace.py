@@ -26,7 +26,6 @@ from ..laws.friction import Shared, own_law
 from ..modal.krylov import Carried
 from ..modal.options import Options
 from ..notebook import Shown, counted
-from ..sliding import full_motion
 from ..sliding.result import SteadySliding
 from ..sliding.solution import steady_nodes
 from ..system import System, build_system
@@ -39,7 +38,7 @@ from .options import options_of
 from .settings import phases_of
 
 SYSTEMS = 16  # kept at the same time, of a case whose matrices depend on μ
-SAME_FRICTION = 1e-6  # of a coefficient: two nodes of a law of speed that differ by less have one
+SAME_FRICTION = 1e-6  # of a coefficient: two contacts with a law of speed that differ by less have one
 KEPT_BY = "`modes`, `steady` and `simulate` without μ answer with each contact's own"
 ACCEPTED = "a case, the path of its file, a system or a workspace"
 
@@ -191,7 +190,7 @@ class Workspace(Shown):
 
     @cached_property
     def own_friction(self) -> float | None:
-        """The coefficient of all contacts at their slip speeds in steady sliding; None where they differ.
+        """The coefficient of all contacts at their mean slip speeds in steady sliding; None where they differ.
 
         Where the case has a parameter mu, and so no contacts, it is that.
         """
@@ -215,14 +214,14 @@ class Workspace(Shown):
         """What is said with results over μ where contacts have different coefficients, which μ takes the place of."""
         if not self.has_contacts or (self._case is not None and len(self._case.contacts) < 2):
             return ()
-        own = frictions_by_contact(self.system()) or {}
+        own = frictions_by_contact(self.system())
         if len(own) < 2 or _one(np.array(list(own.values()))):
             return ()
         given = ", ".join(f"{name} {value:g}" for name, value in own.items())
         nodes = self.system().contact_nodes()
         rigid = {nodes.names[k] for k in nodes.owner[nodes.compliance == 0.0]}
         soft = [name for name in own if name not in rigid]
-        along = "" if self._case is None or not soft else (
+        along = "" if self._case is None or not soft or self.system().load_steps else (
             f", and `onsets --along contacts.{soft[0]}.friction.coefficient` goes along that of one contact"
         )  # fmt: skip
         return (
@@ -282,73 +281,41 @@ class Unsaved(Workspace):
 
 
 def friction_in_sliding(system: System) -> float | None:
-    """The coefficient of all contacts of a system at their slip speeds in steady sliding; None where they differ."""
-    found = frictions_in_sliding(system)
+    """The coefficient of all contacts of a system at their mean slip speeds in steady sliding; None where they
+    differ."""
+    found = np.array(list(frictions_by_contact(system).values()))
     if not len(found):
         return 0.0
     return float(found[0]) if _one(found) else None
 
 
 def _one(coefficients: Array) -> bool:
-    """Whether they are one but for the slip speeds that the facets of a curved contact give it."""
+    """Whether they are one but for the slip speeds that the facets of curved contacts give them."""
     return bool(np.ptp(coefficients) <= SAME_FRICTION * np.max(np.abs(coefficients)))
 
 
 def different_friction(system: System) -> str:
-    """Which contacts have different coefficients in steady sliding, or which one has several, and what to do."""
-    own, named = frictions_by_contact(system), "name it (--mu 0.3), every contact with friction then has it"
-    if own is not None:
-        return f"the case gives them different ones: {named}; {KEPT_BY}"
-    several = [f"{name} {low:g} to {high:g}" for name, (low, high) in _ranges(system).items() if high > low]
-    return (
-        f"the law of a contact gives its nodes several, by their slip speeds ({', '.join(several)}): {named}; "
-        "`steady` and `simulate` without μ answer with those of the law"
-    )
+    """Which contacts have different coefficients in steady sliding, and what to do."""
+    return f"the case gives them different ones: name it (--mu 0.3), every contact with friction then has it; {KEPT_BY}"
 
 
-def _ranges(system: System) -> dict[str, tuple[float, float]]:
-    """The least and the largest coefficient of each contact with friction, in steady sliding; the same where they are
-    one."""
+def frictions_by_contact(system: System) -> dict[str, float]:
+    """The coefficient of each contact with friction, by its law at the mean slip speed of its nodes in steady sliding:
+    that to which a μ asked for scales it, so that with this one it has its own law."""
     nodes = system.contact_nodes()
-    speeds = np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1)
-    # The centre of a turning surface slides at no speed and has no say.
-    all_found, moving = nodes.friction_coefficients(speeds), speeds > 1e-9 * speeds.max(initial=0.0)
-    rubs, found = nodes.share > 0.0, dict[str, tuple[float, float]]()
-    for k, name in enumerate(nodes.names):
-        mine = rubs & (nodes.owner == k)
-        own = all_found[mine & moving] if np.any(mine & moving) else all_found[mine]
-        if len(own):
-            low, high = (own[0], own[0]) if _one(own) else (own.min(), own.max())
-            found[name] = float(low), float(high)
-    return found
-
-
-def frictions_by_contact(system: System) -> dict[str, float] | None:
-    """The coefficient of each contact with friction, in steady sliding; None where one has several, by its law."""
-    found = _ranges(system)
-    return None if any(high > low for low, high in found.values()) else {name: low for name, (low, _) in found.items()}
+    every = zip(nodes.names, nodes.laws, nodes.mean_speed, strict=True)
+    rubbing = set(nodes.owner[nodes.rubs].tolist())
+    return {name: law.sliding(v) for k, (name, law, v) in enumerate(every) if k in rubbing}
 
 
 def in_proportion(system: System) -> tuple[System, float] | None:
     """The system whose contacts keep their coefficients to one another at any μ, and the μ, that of the largest, at
-    which they have their own; None where one has several, by its law."""
-    own = frictions_by_contact(system)
-    if not own:
+    which they have their own; None where none has friction."""
+    own, nodes = frictions_by_contact(system), system.contact_nodes()
+    largest = max(own.values(), default=0.0)
+    if not largest:
         return None
-    largest, nodes = max(own.values()), system.contact_nodes()
     laws = [
         Shared(own_law(law), own.get(name, 0.0) / largest) for name, law in zip(nodes.names, nodes.laws, strict=True)
     ]
     return system.with_laws(laws), largest
-
-
-def frictions_in_sliding(system: System) -> Array:
-    """The coefficient of each contact node (m,) of a system at its slip speed in steady sliding, without those of
-    contacts that have no friction at any μ."""
-    nodes = system.contact_nodes()
-    nodes = nodes.select(nodes.share > 0.0)
-    speeds = np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1)
-    # The centre of a turning surface slides at no speed and has no say, but what holds by sticking has.
-    moving = speeds > 1e-9 * speeds.max(initial=0.0)
-    moved = np.isin(nodes.owner, nodes.owner[moving])
-    return nodes.friction_coefficients(speeds)[moving | ~moved]

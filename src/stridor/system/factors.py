@@ -12,11 +12,8 @@ from ..contact.interface import Contact, Rows
 from ..contact.nodes import ContactNodes
 from ..contact.surfaces import SurfaceContact
 from ..errors import AnalysisError
-from ..laws.friction import FrictionLaw, Shared, own_law, share_of
 from ..typing import Array, Sparse
 from .model import System
-
-SAME = 1e-12  # relative: coefficients that are one
 
 
 def under_factors(system: System, loads: Mapping[str, float], motions: Array) -> System:
@@ -24,8 +21,8 @@ def under_factors(system: System, loads: Mapping[str, float], motions: Array) ->
     whose velocities and distances at factor one are those at factors ``motions`` (p,).
 
     A coefficient asked for of all contacts stays that at the velocities of ``system`` itself, as runs in time have it:
-    a law that depends on speed gives what it makes of it where contacts slide at other ones. Raises AnalysisError where
-    it makes different ones within one contact, and for the system that `System.in_place` has made of another.
+    a law that depends on speed gives what it makes of it where contacts slide at other ones. Raises AnalysisError for
+    the system that `System.in_place` has made of another.
     """
     changed = {name: loads.get(name, 1.0) for name in system.loads}
     if all(factor == 1.0 for factor in changed.values()) and np.all(motions == 1.0):
@@ -57,7 +54,8 @@ def _made(system: System, loads: Mapping[str, float], motions: Array) -> System:
         cubic=None if cubic is None else replace(cubic, rows=_rows(cubic.rows, motions)),
         stress_stiffness=None if stresses is None else partial(_stressed, stresses, motions),
     )
-    return made.with_laws(_laws(system, motions))
+    nodes = system.contact_nodes()
+    return replace(made, friction_speeds=dict(zip(nodes.names, nodes.mean_speed, strict=True)))
 
 
 def _rows(rows: Rows, motions: Array) -> Rows:
@@ -88,28 +86,3 @@ def _stressed(
 ) -> Sparse:
     """The geometric stiffness, with distances (p,) in factors of what is full in the system made."""
     return stresses(displacement) if distances is None else stresses(displacement, distances * motions)
-
-
-def _laws(system: System, motions: Array) -> list[FrictionLaw]:
-    """The laws of all contacts, each with the share that it has at other speeds of a coefficient at those of the
-    system."""
-    nodes = system.contact_nodes()
-    full, other = (
-        np.linalg.norm(nodes.slip_velocity(system.motion.full * factors), axis=1)
-        for factors in (np.ones(len(motions)), motions)
-    )
-    laws: list[FrictionLaw] = []
-    for k, law in enumerate(nodes.laws):
-        mine = np.flatnonzero((nodes.owner == k) & (full > 0.0))
-        before = np.array([law.sliding(float(v)) for v in full[mine]])
-        if law.constant or not np.any(before):
-            laws.append(law)
-            continue
-        shares = np.array([law.sliding(float(v)) for v in other[mine]]) / before
-        if np.ptp(shares) > SAME * np.abs(shares).max():
-            raise AnalysisError(
-                f"friction depends on speed, and contact {nodes.names[k]}, which slides at several speeds, has no "
-                "common coefficient at others"
-            )
-        laws.append(Shared(own_law(law), share_of(law) * float(shares[0])))
-    return laws

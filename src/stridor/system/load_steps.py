@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..typing import Array
+from .motion import PrescribedMotion
 
 
 @dataclass(frozen=True)
@@ -20,3 +23,12 @@ class LoadStep:
     velocities: Array
     duration: float | None
     increments: int
+
+
+def running_on(steps: Sequence[LoadStep], motion: PrescribedMotion) -> Array:
+    """Factors (p,) of the moving supports in steady sliding: one, or those that run on after the last load step; zero
+    for those that are pressed away by a distance."""
+    if not steps:
+        return motion.full
+    last = steps[-1]
+    return np.zeros_like(last.velocities) if last.duration is not None else last.velocities

@@ -21,7 +21,7 @@ from ..laws.friction import FrictionLaw, keeping_frictionless, share_of
 from ..notebook import Shown, counted, html_table
 from ..typing import Array, IntArray, Sparse
 from .given_matrices import contacts_given, not_symmetric_definite, points_given, square_matrices, vectors_given
-from .load_steps import LoadStep
+from .load_steps import LoadStep, running_on
 from .motion import PrescribedMotion
 
 T = TypeVar("T")
@@ -111,7 +111,8 @@ class System(Shown):
     tie_words: warnings about ties. repeating: paths of the ties by which bodies repeat. load_steps: the way to the
     static equilibrium, with stick and partial slip; empty where all contacts slide as the motions have them. placed:
     whether it is what `in_place` has made of another. touching_at: the μ of the steady sliding whose nodes touch in its
-    modes, whichever μ these are of; None where whoever asks for modes says.
+    modes, whichever μ these are of; None where whoever asks for modes says. friction_speeds: contact → slip speed
+    [m/s] at which a μ asked for of all contacts is told, where that is another than its mean one in steady sliding.
 
     Frozen, so that every question has one answer: `once` keeps what is asked for again and again, in ``answers``;
     ``of_matrices`` has what follows from mass, damping and stiffness alone, which systems with other contacts share.
@@ -141,6 +142,7 @@ class System(Shown):
     repeating: tuple[str, ...] = ()
     contact_cubic: Mapping[str, float] = field(default_factory=dict)
     touching_at: float | None = None
+    friction_speeds: Mapping[str, float] = field(default_factory=dict)
     of_matrices: AnswerCache = field(default_factory=AnswerCache, repr=False, compare=False)
     answers: AnswerCache = field(default_factory=AnswerCache, init=False, repr=False, compare=False)
 
@@ -312,16 +314,24 @@ class System(Shown):
             surfaces=tuple(replace(s, law=law, nodes=replace(s.nodes, laws=(law,))) for s, law in surfaces),
         )  # fmt: skip
 
+    def at_friction(self, mu: float | None) -> System:
+        """The same system with the law of every contact scaled so that it gives ``mu`` at its mean slip speed in steady
+        sliding, whatever phases make of that. None: the laws as they are.
+
+        What is solved of the result with no further μ, as steady sliding at another velocity, has the laws that a run
+        in time has."""
+        return self if mu is None else self.with_laws(self.contact_nodes().laws_at(mu))
+
     def without_idle_slip(self) -> System:
         """The system in which nothing slides contacts without friction: what knows friction by the slip leaves them
         out."""
-        if self.contact_nodes().share.all():
+        if self.contact_nodes().rubs.all():
             return self
         return self.once("without idle slip", self._without_idle_slip)
 
     def _without_idle_slip(self) -> System:
         def still(nodes: ContactNodes) -> ContactNodes:
-            slid = np.repeat(nodes.share > 0.0, nodes.directions)
+            slid = np.repeat(nodes.rubs, nodes.directions)
             return replace(nodes, tangent_lift=slid[:, None] * nodes.tangent_lift)
 
         contacts = (replace(c, tangent_lift=float(share_of(c.law) > 0.0) * c.tangent_lift) for c in self.contacts)
@@ -346,11 +356,23 @@ class System(Shown):
 
     def _contact_nodes(self) -> ContactNodes:
         parts = [_point_nodes(c) for c in self.contacts] + [s.nodes for s in self.surfaces]
-        nodes = stack(parts, self.size, len(self.motion.names), self.dimension)
+        nodes = self._with_speeds(stack(parts, self.size, len(self.motion.names), self.dimension))
         if not self.contact_cubic:
             return nodes
         factor = np.array([self.contact_cubic.get(name, 0.0) for name in nodes.names])[nodes.owner]
         return replace(nodes, cubic=factor * np.where(np.isnan(nodes.area), 1.0, nodes.area))
+
+    def _with_speeds(self, nodes: ContactNodes) -> ContactNodes:
+        """With their slip speeds in steady sliding, and those at which a μ of all contacts is told: the mean of each
+        contact; at full velocities where nothing runs on behind the last load step."""
+        running = running_on(self.load_steps, self.motion)
+        speed = np.linalg.norm(nodes.slip_velocity(running), axis=1)
+        told = speed if np.any(running) else np.linalg.norm(nodes.slip_velocity(self.motion.full), axis=1)
+        number = np.bincount(nodes.owner, minlength=len(nodes.names))
+        means = np.bincount(nodes.owner, told, minlength=len(nodes.names)) / np.maximum(number, 1)
+        given = self.friction_speeds
+        at = tuple(given.get(name, float(mean)) for name, mean in zip(nodes.names, means, strict=True))
+        return replace(nodes, speed=speed, mean_speed=at)
 
     def nodes_of_surfaces(self) -> Iterator[tuple[SurfaceContact, slice]]:
         """Each contact over a surface, and where its nodes are among `contact_nodes`."""

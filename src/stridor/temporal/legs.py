@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import CaseError
-from ..sliding import slip_speeds
 from ..system import System
 from ..typing import Array
 from .schedule import PhaseSpec, Schedule, Stretch, lay_out
@@ -35,9 +34,7 @@ class Member:
 
     def system(self, system: System) -> System:
         """The system with its friction."""
-        if self.mu is None:
-            return system
-        return system.with_friction(self.mu, np.abs(slip_speeds(system, system.motion.full)))
+        return system.at_friction(self.mu)
 
     def phases(self, phases: Sequence[PhaseSpec], system: System) -> list[PhaseSpec]:
         """The phases with its factors."""

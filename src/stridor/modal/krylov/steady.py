@@ -91,7 +91,7 @@ def refuse_stick(system: System, what: str) -> None:
     if system.load_steps:
         raise AnalysisError(
             f'{what}: knows contacts that slide, and steady.friction = "stick-slip" lets them stick; what takes that '
-            "is `stridor steady`, `modes`, `onsets`, `shapes`, `simulate` and `compare`"
+            "is `stridor steady`, `modes`, `onsets` over μ, `shapes`, `simulate` and `compare`"
         )
 
 
@@ -130,7 +130,7 @@ def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver
     slip = nodes.slip_velocity(full_motion(system))
     speed = np.linalg.norm(slip, axis=1)
     slides = speed > STILL * float(speed.max(initial=0.0))
-    needed = nodes.share > 0.0
+    needed = nodes.rubs
     still = [
         name for k, name in enumerate(nodes.names) if np.any(needed[m := nodes.owner == k]) and not np.any(slides[m])
     ]
@@ -195,6 +195,8 @@ class Steadiness:
         none.
 
         d = N dμ/d|v| is of each node's own law, scaled to the coefficient that the node has: the share of μ is in it.
+        None of nodes that slip at their limit of friction without a slip velocity, as in `friction_damping_matrix`: the
+        law has a corner there, and whichever way they begin to move back they stick.
         """
         if unstressed(self.system):
             return None, None, None
@@ -210,6 +212,8 @@ class Steadiness:
             slopes = chosen.friction_slopes(
                 steady.slip_speed[self.touching], steady.friction_coefficient[self.touching]
             )
+            # A node at its limit that no motion slides has no slip about which its law could be linearised.
+            slopes = np.where(steady.slips_still[self.touching], 0.0, slopes)
             held = len(self.layer.compliance) - len(self.touching)
             pressing = np.abs(steady.normal_force[self.touching])  # a contact kept closed rubs where it pulls, too
             weakening = np.append(pressing * slopes, np.zeros(held))
@@ -269,7 +273,8 @@ def steadiness(
     there is no load, too.
     """
     speeds = np.linalg.norm(nodes.slip_velocity(full_motion(system)), axis=1)
-    pairs = {(int(nodes.owner[k]), float(speeds[k])) for k in touching}
+    slipping = touching[speeds[touching] > STILL * float(speeds.max(initial=0.0))]
+    pairs = {(int(nodes.owner[k]), float(speeds[k])) for k in slipping}
     sloped = any(nodes.laws[owner].slope(speed) != 0.0 for owner, speed in pairs)
     across = options.friction_damping and nodes.directions == 2 and len(touching) > 0
     prestress = options.prestress and system.stress_stiffness is not None

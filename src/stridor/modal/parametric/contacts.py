@@ -209,7 +209,7 @@ def _springs(contacts: Contacts, *, varied: bool) -> dict[str, FactoredPart]:
     if not soft.any():
         return {}
     rows = sp.csr_array(sp.diags_array(1.0 / contacts.compliance[soft]) @ contacts.normal[soft])
-    slide = contacts.slide if varied else _own_slide(contacts)
+    slide = contacts.pushing if varied else _own_slide(contacts)
     friction = sp.csr_array(slide[soft].T @ rows)
     stiffness: ParameterFactor = Product(((STIFFNESS, 1.0),))
     by_friction: ParameterFactor = Product(((STIFFNESS, 1.0), (FRICTION, 1.0)))
@@ -239,12 +239,14 @@ def _rigid_rows(
         for value in (p.low, p.low + 0.37 * (p.high - p.low), p.high):
             other = contacts_at({**reference, p.name: value})
             same = np.array_equal(other.compliance == 0.0, own.compliance == 0.0)
-            for one, two in ((own.normal, other.normal), (own.slide, other.slide)):
+            # Without μ as a parameter what each node has of its contact's coefficient is judged with that, below.
+            slides = (own.slide, other.slide) if friction is None else (own.pushing, other.pushing)
+            for one, two in ((own.normal, other.normal), slides):
                 same = same and deviation(one[rigid], two[rigid]) <= SAME
             if not same:
                 accepted = (
-                    "moves where rigid contact touches, or the direction of its slip; give numbers that do not, or "
-                    "give the contact a stiffness"
+                    "moves where rigid contact touches, the direction of its slip, or what its nodes have of μ by "
+                    "their slip speeds; give numbers that do not, or give the contact a stiffness"
                 )
                 raise CaseError(f"box.{p.name}", value, accepted)
             if friction is None and deviation(_own_slide(own)[rigid], _own_slide(other)[rigid]) > SAME:
@@ -254,7 +256,7 @@ def _rigid_rows(
                 )
                 raise CaseError(f"box.{p.name}", value, accepted)
     if friction is not None:
-        return own.normal[rigid], own.slide[rigid], friction, None
+        return own.normal[rigid], own.pushing[rigid], friction, None
     # Of rigid contacts that friction works on.
     rubs = own.coefficient[own.touching][rigid]
     rubs = rubs[rubs > 0.0]

@@ -20,7 +20,7 @@ from ...sliding import full_motion, unstressed
 from ...sliding.solution import STILL
 from ...system import System
 from ...typing import Array, IntArray, Sparse
-from ..krylov.steady import Steadiness
+from ..krylov.steady import Steadiness, shared
 from .contacts_equilibria import Equilibria, HeldEquilibria
 from .contacts_sampling import Sampled, Values, combined_matrices, directions, sampled
 from .family import term_of
@@ -32,8 +32,8 @@ PULLING = 1e-9  # of the largest normal force, or gap: more than rounding
 
 @dataclass(frozen=True)
 class Contacts:
-    """The touching nodes (m,) of a system: rows N, S (m, n), compliance (m,), slip speed (m,). Of all nodes (k,): the
-    sense (k, d−1) against the slip and the friction coefficient (k,) of their laws."""
+    """The touching nodes (m,) of a system: rows of the gap N and along the slip T (m, n), compliance (m,), slip speed
+    (m,). Of all nodes (k,): the sense (k, d−1) against the slip and the friction coefficient (k,) of their laws."""
 
     nodes: ContactNodes
     touching: IntArray
@@ -52,6 +52,11 @@ class Contacts:
         if not len(found):
             return 0.0
         return float(found[0]) if np.ptp(found) <= 1e-12 * np.max(np.abs(found)) else None
+
+    @property
+    def pushing(self) -> Sparse:
+        """S (m, n): friction pushes with μ S, each node with its share of μ."""
+        return shared(self.slide, self.nodes.select(self.touching).share)
 
     @property
     def across(self) -> Sparse:

@@ -71,7 +71,7 @@ def first_changes(family: HarmonicFamily, mu: float, applied: Applied, mode: Com
     force = applied.by_force[:, 0] * (z_n - family.spring * gap) + applied.by_gap[:, 0] * gap
     speed = np.abs(np.einsum("md,md->m", s * along, family.slip)) / np.maximum(family.speed, 1e-300)
     touching = applied.status[:, 0] > 0
-    rubs = touching & (family.nodes.share > 0.0)
+    rubs = touching & family.nodes.rubs
     shares = [
         np.where(touching & ~family.nodes.kept, np.abs(steady.normal) / np.maximum(np.abs(force), 1e-300), np.inf),
         np.where(rubs, family.speed / np.maximum(speed, 1e-300), np.inf),

@@ -42,10 +42,7 @@ def why_not_harmonic(system: System) -> str:
     cubic = system.cubic
     if cubic is not None and np.any(np.abs(cubic.rows.lift @ factors) > 0.0):
         return "a cubic spring is stretched without end by what moves"
-    speeds = np.linalg.norm(nodes.slip_velocity(factors), axis=1)
-    for k, (name, law) in enumerate(zip(nodes.names, nodes.laws, strict=True)):
-        mine = nodes.owner == k
-        one = law.scaled(1.0, float(speeds[mine].mean()) if np.any(mine) else 0.0)
+    for name, one in zip(nodes.names, nodes.laws_at(1.0), strict=True):
         if one.sticking > (1.0 + 1e-12) * one.sliding(0.0):
             return (
                 f"contact {name} sticks up to a larger coefficient than it slides with at rest, so that its force "
@@ -162,4 +159,4 @@ class HarmonicFamily:
         nodes = self.nodes
         if self.own:
             return [law.scaled(mu * law.sliding(1.0), 1.0) for law in nodes.laws]
-        return [law.scaled(mu, float(self.speed[nodes.owner == k].mean())) for k, law in enumerate(nodes.laws)]
+        return list(nodes.laws_at(mu))

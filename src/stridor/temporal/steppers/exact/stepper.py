@@ -38,7 +38,6 @@ from ...stepper import Disturbance
 from ...trajectory import Trajectory
 from ..basis import Basis
 from ..coordinates import Coordinates, all_modes, left_out, truncated
-from ..friction import frictional
 from ..starting import not_begun
 from .drive import pieces
 from .leaps import Leaps
@@ -97,7 +96,7 @@ def exact_stepper(system: System, settings: Settings, mu: float | None, why: str
     """A system made ready, and why this way; mu scales every contact's friction law at its slip speed. Raises CaseError
     for a system that it does not take."""
     refuse(system, settings.cutoff_hz)
-    return ExactStepper(frictional(system, mu), settings, why)
+    return ExactStepper(system.at_friction(mu), settings, why)
 
 
 def coordinates_of(system: System, cutoff_hz: float | None) -> Coordinates:

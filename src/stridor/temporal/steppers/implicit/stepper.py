@@ -24,7 +24,6 @@ from ...sketch import sketch
 from ...stepper import Disturbance
 from ...trajectory import Trajectory
 from ..coordinates import COMPLETE, Coordinates, coordinates, pushed_at, rows_of
-from ..friction import frictional
 from ..starting import OVERLAP
 from .arrays import BY_NEWTON, DONE, KEPT, MOST_SWEEPS, NODES_KEPT, UNCONVERGED, Nodes, Record, StepState, Structure
 from .build import fresh_state, nodes_of, structure_of, work_space
@@ -96,7 +95,7 @@ def implicit_stepper(system: System, settings: Settings, mu: float | None, why: 
     """A system made ready, and why this way; mu scales every contact's friction law at its slip speed. Raises CaseError
     for a system that it does not take."""
     refuse(system, settings)
-    system = frictional(system, mu)
+    system = system.at_friction(mu)
     return ImplicitStepper(system, system.contact_nodes(), settings, why)
 
 

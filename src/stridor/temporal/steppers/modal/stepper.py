@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ....errors import AnalysisError, CaseError
-from ....sliding import slip_speeds
 from ....system import System
 from ....system.uncoupled import UncoupledModes, no_complete_basis, uncoupled_modes
 from ....typing import Array
@@ -38,8 +37,7 @@ def modal_stepper(
 
     Raises CaseError for a step beyond the limit and contact springs that the step cannot follow.
     """
-    if mu is not None:
-        system = system.with_friction(mu, np.abs(slip_speeds(system, system.motion.full)))
+    system = system.at_friction(mu)
     limit = step_limit(system, settings.beta2)
     numbers = scheme(choose_step(limit, settings), settings.beta2)
     check_stiffness(system, numbers.step)

@@ -21,7 +21,6 @@ from ...sketch import sketch
 from ...stepper import Disturbance
 from ...trajectory import Trajectory
 from ..curve import check_stiffness, left_the_line
-from ..friction import frictional
 from .bends import Turning
 from .feet import NEW_ROWS, OFF_LINE
 from .forcing import KEPT, MOST_SWEEPS, NODES_KEPT, STEPS_DONE, UNCONVERGED
@@ -67,7 +66,7 @@ def sparse_stepper(
     if lagged:
         diagonal_mass(system)
     limit = (step_limit_assembled if lagged else step_limit)(system, settings.beta2)  # known from other coefficients
-    system = frictional(system, mu)
+    system = system.at_friction(mu)
     numbers = scheme(choose_step(limit, settings), settings.beta2)
     check_stiffness(system, numbers.step)
     return SparseStepper(assembled_machine(system, numbers, system.contact_nodes(), lagged=lagged), limit, path, reason)
