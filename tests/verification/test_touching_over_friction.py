@@ -573,3 +573,62 @@ def test_as_many_eigenvalues_grow_behind_a_border_as_its_onsets_say(
     assert (len(begun), len(ended)) == (begins, ends)
     count = {side: sum(1 if complex(v).imag == 0 else 2 for v in values) for side, values in (("before", before), ("after", after))}
     assert roots(begun, ends=False) + roots(ended, ends=True) == count["after"] - count["before"]
+
+
+STANDING = """
+units = "nondimensional"
+materials.r = {{ young_modulus = 1.0, density = 1.0, poisson_ratio = 0.3 }}
+bodies.b = {{ type = "solid", model = "{model}", material = "r", {mesh}, damping = {{ mass = 0.01, stiffness = 0.005 }} }}
+supports.top = {{ at = "b.top", fixed = ["x"] }}
+contacts.A = {{ slave = "b.bottom", master = "belt", stiffness = 0.5, friction = {{ law = "coulomb", coefficient = 0.9 }} }}
+[bodies.belt]
+type = "obstacle"
+shape = "flat"
+point = {point}
+normal = {normal}
+sliding.velocity = {velocity}
+[modal]
+max_frequency_hz = 1.0
+friction_range = [0.0, 3.0]
+"""
+
+
+def test_nodes_of_a_stretch_are_not_those_of_a_friction_at_which_one_is_about_to_open() -> None:
+    """At μ = 0.9 the block stands on its edge, and the node beside it, which touches from 0.444 on, carries nothing.
+    The truth is dense: one pair begins to grow between 0.84 and 0.845, no root is zero."""
+    mesh = 'thickness = 1.0, mesh = {shape = "rectangle", corner = [0, 0], size = [1.0, 0.6], divisions = [2, 1], cells = "quad"}'
+    plane = {"point": "[0, 0]", "normal": "[0, 1]", "velocity": "[-0.02, 0]"}
+    made = st.loads(STANDING.format(model="plane strain", mesh=mesh, **plane)).with_(
+        {
+            "bodies.b.points": {"p": (1.0, 0.0)},
+            "springs.s": {"between": ("b.p", "ground"), "direction": (0, 1), "stiffness": 0.01},
+            "loads.press": {"at": "b.top", "pressure": 0.02},
+        }
+    )
+    told = []
+    for own in (0.9, 0.3):
+        found = st.onsets(made.with_({"contacts.A.friction.coefficient": own}))
+        assert found.complete
+        told.append([(o.kind, o.branches, o.mu) for o in found.onsets])
+    assert told[0] == told[1]
+    assert [kind for kind, *_ in told[0]] == ["flutter", "contact", "flutter"]
+    assert 0.84 < told[0][-1][-1] < 0.845
+    for mu, grow in ((0.6, 0), (0.83, 0), (0.85, 1), (0.89, 1)):
+        assert int(st.modes(made, mu).unstable.sum()) == grow
+
+
+@pytest.mark.parametrize("damping", [0.01, 0.0])
+def test_what_has_no_stiffness_neither_grows_nor_diverges(damping: float) -> None:
+    """A block in space that nothing presses, nor holds sideways: rounding of its zero root was a divergence that began
+    and ended a dozen times, and a mode that grows at every other μ."""
+    mesh = 'mesh = {shape = "block", corner = [0, 0, 0], size = [1.0, 0.8, 0.6], divisions = [1, 1, 1]}'
+    space = {"point": "[0, 0, 0]", "normal": "[0, 0, 1]", "velocity": "[-0.02, 0, 0]"}
+    made = st.loads(STANDING.format(model="3d", mesh=mesh, **space)).with_({"bodies.b.damping.mass": damping})
+    swept = st.modes(made, np.linspace(0.0, 1.0, 21), check=False)
+    assert np.all(swept.frequency_hz.min(axis=1) < 1e-6)
+    assert not np.any(swept.unstable & (swept.frequency_hz < 0.1))
+    found = st.onsets(made, (0.0, 1.0))
+    assert {o.kind for o in found.onsets} == {"flutter"}
+    grow = int(swept.unstable[-1].sum())
+    assert sum(o.roots for o in found.onsets) == 2 * grow > 0
+    assert found.complete

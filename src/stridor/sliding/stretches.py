@@ -18,7 +18,7 @@ from ..system import System
 from ..typing import Array, BoolArray
 from .equilibrium import FEW
 from .motions import placed
-from .pressing import anything_acts
+from .pressing import anything_acts, least_force
 from .solution import ALL_TRIED, STEADY, SteadySliding, other_equilibria, steady_nodes, steady_sliding
 
 HELD = "are held at every μ of the model"  # nodes of one friction coefficient
@@ -29,6 +29,7 @@ SMALL = 8000  # freedoms
 WIDTH = 1e-9  # of the largest μ: how closely a change is enclosed
 WIDTH_ALONG = 1e-7  # of the largest size of another number, each of whose values is a system of its own
 WIDTH_OF_NONE = 1e-3  # where there is no equilibrium on one side, which costs far more to find out
+UNCLEAR = b""  # key of a μ at which who touches may be read in two ways
 EDGE = 1e-3  # of a stretch: closer to a border it is looked at elsewhere which nodes it has
 MOST = 40  # changes of single nodes; where there are more, each is small, and stretches of equal length do
 EQUAL = 12  # of them
@@ -257,13 +258,16 @@ class _Equilibria:
         return WIDTH
 
     def own(self) -> bytes | None:
-        """The key of the laws' own coefficients; None where there is no steady sliding."""
+        """The key of the laws' own coefficients; None where there is no steady sliding, and UNCLEAR where a node is
+        about to open there, so that no stretch takes its nodes from it."""
         try:
             found = self._solved(None)
         except AnalysisError:
             return None  # what is asked of others needs it not
         self._guess = found.active
-        return _key(found)
+        touches = found.active & ~self._system.contact_nodes().kept
+        clear = np.all(found.normal_force[touches] > least_force(self._system.in_place()))
+        return _key(found) if clear else UNCLEAR
 
     def at(self, mu: float) -> _Look:
         """Steady sliding at ``mu``, kept with the system, also that there is none, which is dear to find out."""

@@ -189,8 +189,11 @@ class Linearised:
     """A case at one μ with the modes of its band, what each number does to its matrices, and the modes' vectors as
     they are asked for."""
 
-    def __init__(self, work: Workspace, mu: float, modes: ComplexModes, *, damped: bool, handed: Carried) -> None:
-        self.work, self.mu, self.modes, self.damped, self.handed = work, mu, modes, damped, handed
+    def __init__(
+        self, work: Workspace, mu: float, modes: ComplexModes, *, damped: bool, handed: Carried | None = None
+    ) -> None:
+        self.work, self.mu, self.modes, self.damped = work, mu, modes, damped
+        self.handed = Carried() if handed is None else handed
         self.case, self.options = work.case("a sensitivity"), work.options
         self.system = self._as_asked(work.system(mu))
         self.eigenvalues: ComplexArray = modes.eigenvalues[0]

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 
 from ...typing import Array, ComplexArray, Sparse
+from ..at_rest import moving, rest_limit
 from ..dense_problem import DenseProblem, Eigenpairs, combined
 from .problem import ContactProblem, Extras, Varying
 from .shifted import ForcedShapes, Shifted, orthonormal, real_columns
@@ -284,7 +286,24 @@ class Reduced(DenseProblem):
         """See `DenseProblem`; own says how many of the unknowns belong to pairs."""
         if mu in self._known:
             return self._known[mu]
-        return self.remembered(replace(super().untracked(mu), own=self.pairs.count))
+        return self.remembered(replace(self._resting(super().untracked(mu)), own=self.pairs.count))
+
+    def _resting(self, found: Eigenpairs) -> Eigenpairs:
+        """With zeros for what is zero but for rounding, where some motion has no stiffness: whether rounding makes it
+        grow says nothing."""
+        if not self.damped:
+            return found
+        moves = moving(found.values, self.frequency, lambda: self.rest_limit)
+        if np.all(moves):
+            return found
+        values = np.where(moves, found.values, 0.0)
+        return replace(found, values=values, coordinate=values)
+
+    @cached_property
+    def rest_limit(self) -> float:
+        """Up to which |λ| [1/s] eigenvalues may be zero but for rounding: see `at_rest.rest_limit`."""
+        ends = [self.problem.pencil(mu).condensed() for mu in dict.fromkeys((0.0, self.high))]
+        return rest_limit(ends, self.frequency, self.problem.solver)
 
     def padded(self, found: Eigenpairs, vectors: ComplexArray) -> ComplexArray:
         """Vectors (r, k) of pairs found before the basis grew, on the basis as it is now."""
