@@ -409,3 +409,42 @@ def test_a_position_of_masses_is_measured_by_how_far_they_are_apart():
     change = 4.0 * (np.outer(n, turn) + np.outer(turn, n))
     rates = np.einsum("ik,ij,jk->k", shapes, change, shapes) / (2.0 * np.sqrt(squares))
     assert sorted(found[0][0].imag) == pytest.approx(sorted(rates), rel=1e-6)
+
+
+LEANING = """
+materials.a = { young_modulus = 3e9, density = 2500.0, poisson_ratio = 0.3 }
+springs.lean = { between = ["pad.tip", "ground"], direction = [-0.7, 0.7], stiffness = 2e7 }
+springs.hold = { between = ["pad.tail", "ground"], direction = [1.0, 0.1], stiffness = 1e7 }
+loads.p = { at = "pad.top", pressure = 1e6 }
+supports.end = { at = "pad.left", fixed = ["x"], displacement = { x = 0.0 } }
+contacts.A = { slave = "pad.bottom", master = "belt", stiffness = 5e12, friction = { law = "coulomb", coefficient = 0.3 } }
+modal = { max_frequency_hz = 40e3, friction_range = [0.0, 0.8] }
+[bodies.belt]
+type = "obstacle"
+shape = "flat"
+point = [0.0, 0.0]
+normal = [0.0, 1.0]
+sliding.velocity = [2.0, 0.0]
+[bodies.pad]
+type = "solid"
+model = "plane strain"
+material = "a"
+thickness = 0.02
+mesh = { shape = "rectangle", corner = [0.0, 0.0], size = [0.04, 0.012], divisions = [3, 2], cells = "quad" }
+damping = { mass = 20.0, stiffness = 1e-7 }
+points = { tip = [0.04, 0.012], tail = [0.0, 0.012] }
+"""
+
+
+@pytest.mark.parametrize("changes", [{"contacts.A.cubic": 1e24}, {"modal.prestress": True}])
+@pytest.mark.parametrize("path", ["contacts.A.interference", "supports.end.displacement.x"])
+def test_lengths_that_press_have_derivatives_at_zero(changes, path):
+    """A step of a thousandth of a metre is no small one for them; the truth are new solutions at nanometres."""
+    model = loads(LEANING).with_(changes)
+    found = sensitivities(model, [path], mu=0.15, modes="all")
+    ends = [modes(model.with_({path: h}), 0.15).eigenvalues[0] for h in (-1e-8, 1e-8)]
+    assert len(ends[0]) == len(ends[1])
+    true = np.array([(b - a) / 2e-8 for a, b in zip(*ends, strict=True)])
+    size = np.abs(true).max()
+    assert size > 1e3
+    assert np.abs(found.derivative[0] - true[: found.derivative.shape[1]]).max() < 1e-2 * size

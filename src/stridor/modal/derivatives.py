@@ -259,13 +259,15 @@ def rate_of(
 
 
 def rate_from_zero(at: Callable[[float], Pencil], scale: float, *, base: Pencil) -> PencilChange:
-    """Change of P per unit of a number at zero that is not negative and on which steady sliding depends.
+    """Change of P per unit of a number at zero on which steady sliding depends.
 
-    scale: values that are no longer small. Steps begin well below it and become smaller until two of them agree. Raises
-    AnalysisError where they do not.
+    scale: values that are no longer small. Steps begin well below it and become smaller until two of them agree, but
+    where P is affine over the first. Raises AnalysisError where they do not.
     """
     step = FIRST * scale
-    found = rate_of(at, 0.0, step, base=base)[0]
+    found, affine = rate_of(at, 0.0, step, base=base)
+    if affine:
+        return found
     for _ in range(MOST):
         step *= FINER
         finer = rate_of(at, 0.0, step, base=base)[0]

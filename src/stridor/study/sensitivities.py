@@ -279,10 +279,14 @@ class Linearised:
             return pencil_of(system, self.friction(system), self.held, self.options)
 
         try:
-            if compliance and not self.value(path) and step is None:
-                found = rate_from_zero(at, self._yielding(), base=self.pencil)
+            value, step = self.value(path), step or self._step(path)
+            scale = None if value or step else self._yielding() if compliance else self._displaced(path)
+            if scale:
+                found = rate_from_zero(at, scale, base=self.pencil)
             else:
-                found = rate_of(at, self.value(path), step or self._step(path), base=self.pencil)[0]
+                found, affine = rate_of(at, value, step, base=self.pencil)
+                if not (value or step or affine):  # nothing says how far from zero is near
+                    found = rate_from_zero(at, 1.0, base=self.pencil)
         except CaseError as error:
             accepted = f"a number that can be varied a little ({error.problems[0].accepted})"
             raise CaseError(path, self.value(path), accepted) from error
@@ -313,6 +317,13 @@ class Linearised:
             return SHAPE_STEP * (float(size) or 1.0)
         shapes = steps[0] == "bodies" and is_of_shape(self.case, steps)
         return SHAPE_STEP * (abs(self.value(path)) or 1.0) if shapes else None
+
+    def _displaced(self, path: str) -> float:
+        """How far bodies move in steady sliding [m], where a number is a length by which something is pressed: as far
+        from zero changes all contact forces. 0.0 of other numbers."""
+        if not is_of_shape(self.case, split_path(path)):
+            return 0.0
+        return float(np.abs(steady_nodes(self.system, self.mu, self.options.solver).displacement).max(initial=0.0))
 
     def _yielding(self) -> float:
         """A compliance of contact [m³/N, m/N of a point] with which bodies come as near as they move in steady
