@@ -245,7 +245,7 @@ def judge(
     """Whether both approaches agree at one μ, None where the signal shows nothing or tells no components apart, where
     what grows has another shape (MAC, None where it was not taken or, if asked for, not told) and where the modes are
     not borne out (``completeness``), and the sentence that says it. last: the mode that dies out last, which contacts
-    may not show. rival: one that grows as fast as ``here``. hidden: one that grows, faster than all that contacts show,
+    may not show, or the step may damp. rival: one that grows as fast as ``here``. hidden: one that grows, faster than all that contacts show,
     which ``unstable`` is about: then nothing agrees."""
     agrees, sentence = _judged(mu, unstable, here, perturbation, frequency, rate)
     if agrees is False and perturbation.untold:
@@ -257,7 +257,8 @@ def judge(
         sentence = f"{sentence}; in which shape is not told, as the bodies move in more than what was fitted"
     slower = last is not None and last.real - here.real > max(SAME_DECAY * abs(here.real), LEVEL * abs(last))
     if agrees and not unstable and last is not None and slower:
-        sentence = f"{sentence}; by the modes {_vibration(last)} dies out last, which the contacts do not show"
+        unseen = "which the motion in time does not show: contacts may not, or its step damps it"
+        sentence = f"{sentence}; by the modes {_vibration(last)} dies out last, {unseen}"
     if rival is not None:
         sentence = f"{sentence}; by the modes {_vibration(rival)} grows as fast, within {100 * GOOD_GROWTH:g} %"
     if hidden is not None:
