@@ -682,7 +682,11 @@ def model(monkeypatch, forces, *, own: float = 0.1, size: int = 10, none_beyond:
     held = np.isin(np.arange(len(forces)), kept)
     nodes = SimpleNamespace(count=len(forces), kept=held)
     once = AnswerCache().once
-    return SimpleNamespace(contact_nodes=lambda: nodes, loads={"P": 1}, load_steps=(), motion=STILL, size=size, once=once), asked
+    system = SimpleNamespace(
+        contact_nodes=lambda: nodes, loads={"P": 1}, load_steps=(), motion=STILL, size=size, once=once
+    )
+    system.in_place = lambda: system
+    return system, asked
 
 
 LINES = [(1.0, 1.0), (1.0, -1 / 0.31), (-0.1, 1 / 3.3), (1.0, -1 / 0.7001)]  # change at 0.31, 0.33 and 0.7001

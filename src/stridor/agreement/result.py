@@ -245,8 +245,8 @@ def judge(
     """Whether both approaches agree at one μ, None where the signal shows nothing or tells no components apart, where
     what grows has another shape (MAC, None where it was not taken or, if asked for, not told) and where the modes are
     not borne out (``completeness``), and the sentence that says it. last: the mode that dies out last, which contacts
-    may not show, or the step may damp. rival: one that grows as fast as ``here``. hidden: one that grows, faster than all that contacts show,
-    which ``unstable`` is about: then nothing agrees."""
+    may not show, or the step may damp. rival: one that grows as fast as ``here``. hidden: one that grows, faster than
+    all that contacts show, which ``unstable`` is about: then nothing agrees."""
     agrees, sentence = _judged(mu, unstable, here, perturbation, frequency, rate)
     if agrees is False and perturbation.untold:
         said = "unstable" if unstable else "stable"
