@@ -770,7 +770,7 @@ def test_nothing_is_looked_at_where_nothing_can_change(monkeypatch) -> None:
 
 def test_contacts_kept_closed_are_looked_at_as_they_may_turn_from_pushing_to_pulling(monkeypatch) -> None:
     system, asked = model(monkeypatch, LINES)
-    vars(system).update(contact_nodes=lambda: SimpleNamespace(count=2, kept=np.ones(2, dtype=bool)))
+    vars(system).update(contact_nodes=lambda: SimpleNamespace(count=4, kept=np.ones(4, dtype=bool)))
     assert len(stretches.stretches(system, 0.1, 0.5)) > 1
     assert asked
 
