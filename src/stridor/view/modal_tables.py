@@ -73,7 +73,8 @@ def coupled_table(frequencies: Array, printed: tuple[ReferenceFrequency, ...], o
     """Frequencies in contact without friction; which of them meet where."""
     meets: dict[int, str] = {}
     for onset in reversed(onsets.onsets if onsets is not None else ()):
-        for branch in onset.branches:
+        # What diverges, or grows because other nodes touch, meets none.
+        for branch in set(onset.branches) if onset.kind == "flutter" and len(set(onset.branches)) > 1 else ():
             meets[branch] = f"μ = {measured(onset.mu, 4)}, {measured(onset.frequency_hz, 0)} Hz"
     rows: list[TableRow] = []
     for i, j in paired(frequencies, [p.frequency_hz for p in printed]):
