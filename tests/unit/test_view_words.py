@@ -10,13 +10,16 @@ import numpy as np
 import stridor as st
 from rubbing_block import rubbing_block
 from stridor.agreement import Agreement, Comparison, Perturbation
+from stridor.app.pipeline import Outcome
 from stridor.case import template_text
+from stridor.case.schema import Rotation, Tie
 from stridor.modal.complex_modes import ComplexModes
 from stridor.modal.onsets import Onsets
 from stridor.temporal.signals import Components
 from stridor.view.inputs import NamedFrequencies, ReportInputs
 from stridor.view.modal_tables import body_table, frequency_tables
-from stridor.view.words import _agreement_sentence, _onset_sentence, model_in_words
+from stridor.view.report import sections
+from stridor.view.words import _agreement_sentence, _onset_sentence, model_in_words, verdict
 
 
 def report(**more: Any) -> Any:
@@ -78,3 +81,26 @@ def test_letters_of_modes_are_those_that_there_are() -> None:
     case = st.loads(rubbing_block("max_frequency_hz = 30e3"))
     inputs = ReportInputs(case=case, body_modes={"stiff": NamedFrequencies(np.zeros(0), ())})
     assert frequency_tables(inputs) == []
+
+
+def test_of_bodies_that_repeat_the_answer_is_of_motions_alike() -> None:
+    case = st.loads(rubbing_block("max_frequency_hz = 20e3"))
+    turn = Tie(slave="block.end", master="block.start", rotation=Rotation(angle_deg=30.0))
+    sector = case.model_copy(update={"ties": {"turn": turn}})
+    nothing = Onsets((), (0.0, 0.5), 20e3, True)
+
+    def answer(of: st.Case, **more: Any) -> Any:
+        return verdict(ReportInputs(case=of, mu=0.4, damped_onsets=nothing, **more))
+
+    whole, alike = (answer(of, modes=sweep(-5.0, 3e3)) for of in (case, sector))
+    assert whole.headline == "It does not squeal at μ = 0.4 up to 20 kHz"
+    assert alike.headline == f"{whole.headline}, in motions alike in all sectors"
+    assert "unstable up to 20 kHz." in whole.paragraph
+    assert "unstable up to 20 kHz, in motions alike in all sectors." in alike.paragraph
+    assert alike.paragraph.endswith("All of that is of motions alike in all sectors alone (ties.turn).")
+    assert "alike" not in whole.paragraph
+    assert answer(sector).headline == "Not decided: no modes at the friction of the case"
+    chapter = next(c for c in sections(ReportInputs(case=sector, damped_onsets=nothing)) if c.name == "modal")
+    assert any(line.endswith("≤ μ ≤ 0.5, in motions alike in all sectors.") for line in chapter.paragraphs)
+    computed: Any = SimpleNamespace(case=sector, agreement=None, onsets_damped=nothing)
+    assert Outcome(None, (), computed).verdict == "no onset in range, in motions alike in all sectors"
