@@ -333,7 +333,7 @@ def test_a_model_without_units_keeps_its_digits() -> None:
     assert "0.159" in cells
     assert quantity(-0.0) == "0.0"
     assert quantity(3199.75) == "3199.8"
-    assert quantity(-2.5e-7) == "−2.50e−07"
+    assert quantity(-2.5e-7) == "−2.50 · 10⁻⁷"
 
 
 def test_what_is_drawn_is_told(writing):

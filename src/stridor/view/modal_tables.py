@@ -19,6 +19,7 @@ from .tables import (
     number,
     paired,
     percent,
+    powers,
     quantity,
     same_as_printed,
     significant,
@@ -233,10 +234,13 @@ def modes_table(modes: ComplexModes, mu: float, max_frequency_hz: float, damping
         TableRow(
             (
                 str(int(modes.branch[b])),
-                readable(float(modes.frequency_hz[row, b])).replace("-", "−"),
-                readable(
-                    float(modes.growth_rate[row, b]), zero=UNSTABLE_RELATIVE * abs(complex(modes.eigenvalues[row, b]))
-                ).replace("-", "−"),
+                powers(readable(float(modes.frequency_hz[row, b]))),
+                powers(
+                    readable(
+                        float(modes.growth_rate[row, b]),
+                        zero=UNSTABLE_RELATIVE * abs(complex(modes.eigenvalues[row, b])),
+                    )
+                ),
                 number(100 * float(modes.damping_ratio[row, b]), 4),
                 "unstable" if modes.unstable[row, b] else "stable",
                 significant(float(modes.residual[row, b]), 2),
