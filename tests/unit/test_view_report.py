@@ -29,7 +29,7 @@ from stridor.temporal.signals import spectrogram
 from stridor.view import FrictionCurve, NamedFrequencies, NamedShape, ReportInputs, plots, write_report
 from stridor.view import report as report_module
 from stridor.view.modal_tables import onset_tables
-from stridor.view.page_parts import tidy
+from stridor.view.page_parts import ReportFigure, tidy
 from stridor.view.report import sections
 from stridor.view.tables import quantity
 from stridor.view.temporal_tables import energy_table
@@ -278,6 +278,33 @@ def test_what_goes_into_contacts_is_not_said_to_be_of_impacts_alone():
     assert "into impacts and contact springs" in [text.get_text() for text in labels]
 
 
+def test_modes_over_friction_are_counted_where_some_mu_have_none() -> None:
+    def drawn(modes) -> dict[str, tuple[str, str, str]]:
+        inputs = full_inputs(undamped_sweep=None, undamped_onsets=None, damped_sweep=modes, agreement=None)
+        parts = [p for chapter in sections(inputs) for p in chapter.parts if isinstance(p, ReportFigure)]
+        return {p.name: (p.title, p.caption, p.alt) for p in parts}
+
+    whole = sweep()
+    title, caption, alt = drawn(whole)["frequencies-damped"]
+    assert title == "The first 3 frequencies over friction, with structural damping"
+    assert "A line that ends" not in caption
+    nothing = np.zeros(len(whole.mu), dtype=bool)
+    nothing[-10:] = True
+    lam = whole.eigenvalues.copy()
+    lam[nothing] = complex(np.nan, np.nan)
+    assert drawn(replace(whole, eigenvalues=lam, unsolved=nothing))["frequencies-damped"] == (title, caption, alt)
+    lam[:30, 1] = complex(np.nan, np.nan)
+    title, caption, alt = drawn(replace(whole, eigenvalues=lam, unsolved=nothing))["frequencies-damped"]
+    assert title == "Frequencies of 3 modes over friction, with structural damping"
+    assert "A line that ends was not followed any further, as where other nodes touch." in caption
+    assert alt.startswith("Frequencies of 3 modes over the friction coefficient")
+    one = replace(whole, eigenvalues=lam[:, :1], branch=whole.branch[:1], residual=whole.residual[:, :1])
+    title, _, alt = drawn(one)["frequencies-damped"]
+    assert (title.split(",")[0], alt[:21]) == ("Frequencies of 1 mode over friction", "Frequencies of 1 mode")
+    lam[:] = whole.eigenvalues + 1j * 1e9
+    assert "frequencies-damped" not in drawn(replace(whole, eigenvalues=lam))
+
+
 def test_chapters_without_content_are_not_there():
     names = [chapter.name for chapter in sections(ReportInputs(paper_case().with_({"reference": None})))]
     assert names == ["model"]
@@ -306,7 +333,7 @@ def test_a_model_without_units_keeps_its_digits() -> None:
     assert "0.159" in cells
     assert quantity(-0.0) == "0.0"
     assert quantity(3199.75) == "3199.8"
-    assert quantity(-2.5e-7) == "−2.50e−07"
+    assert quantity(-2.5e-7) == "−2.50 · 10⁻⁷"
 
 
 def test_what_is_drawn_is_told(writing):

@@ -20,7 +20,7 @@ from stridor.view.figures import temporal_figures
 from stridor.view.inputs import NamedFrequencies, ReportInputs
 from stridor.view.modal_tables import body_table, coupled_table, frequency_tables, onset_tables
 from stridor.view.surface_figures import surface_table
-from stridor.view.tables import number, paired, percent, same_as_printed, significant
+from stridor.view.tables import number, paired, percent, quantity, same_as_printed, significant
 from stridor.view.temporal_tables import contact_table, energy_table, values_table
 from stridor.view.windows import regime_window, shown_motion, status_spans
 
@@ -90,6 +90,8 @@ def test_onsets_meet_their_printed_values_by_frequency():
         (significant(2e-8), "2 · 10⁻⁸"),
         (significant(1e10), "10¹⁰"),
         (significant(-3.25e-7, 3), "−3.25 · 10⁻⁷"),
+        (quantity(5.02e-12), "5.02 · 10⁻¹²"),
+        (quantity(-2e13), "−2.00 · 10¹³"),
         (percent(0.000001), "0.00 %"),
         (percent(-0.0453), "−4.53 %"),
     ],

@@ -6,17 +6,23 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
 import stridor as st
 from rubbing_block import rubbing_block
 from stridor.agreement import Agreement, Comparison, Perturbation
+from stridor.app.pipeline import Outcome
 from stridor.case import template_text
+from stridor.case.schema import Rotation, Tie
 from stridor.modal.complex_modes import ComplexModes
 from stridor.modal.onsets import Onsets
 from stridor.temporal.signals import Components
+from stridor.view import surface_figures
+from stridor.view.body_words import body_words
 from stridor.view.inputs import NamedFrequencies, ReportInputs
 from stridor.view.modal_tables import body_table, frequency_tables
-from stridor.view.words import _agreement_sentence, _onset_sentence, model_in_words
+from stridor.view.report import sections
+from stridor.view.words import _agreement_sentence, _onset_sentence, model_in_words, verdict
 
 
 def report(**more: Any) -> Any:
@@ -78,3 +84,58 @@ def test_letters_of_modes_are_those_that_there_are() -> None:
     case = st.loads(rubbing_block("max_frequency_hz = 30e3"))
     inputs = ReportInputs(case=case, body_modes={"stiff": NamedFrequencies(np.zeros(0), ())})
     assert frequency_tables(inputs) == []
+
+
+def test_of_bodies_that_repeat_the_answer_is_of_motions_alike() -> None:
+    case = st.loads(rubbing_block("max_frequency_hz = 20e3"))
+    turn = Tie(slave="block.end", master="block.start", rotation=Rotation(angle_deg=30.0))
+    sector = case.model_copy(update={"ties": {"turn": turn}})
+    nothing = Onsets((), (0.0, 0.5), 20e3, True)
+
+    def answer(of: st.Case, **more: Any) -> Any:
+        return verdict(ReportInputs(case=of, mu=0.4, damped_onsets=nothing, **more))
+
+    whole, alike = (answer(of, modes=sweep(-5.0, 3e3)) for of in (case, sector))
+    assert whole.headline == "It does not squeal at μ = 0.4 up to 20 kHz"
+    assert alike.headline == f"{whole.headline}, in motions alike in all sectors"
+    assert "unstable up to 20 kHz." in whole.paragraph
+    assert "unstable up to 20 kHz, in motions alike in all sectors." in alike.paragraph
+    assert alike.paragraph.endswith("All of that is of motions alike in all sectors alone (ties.turn).")
+    assert "alike" not in whole.paragraph
+    assert answer(sector).headline == "Not decided: no modes at the friction of the case"
+    chapter = next(c for c in sections(ReportInputs(case=sector, damped_onsets=nothing)) if c.name == "modal")
+    assert any(line.endswith("≤ μ ≤ 0.5, in motions alike in all sectors.") for line in chapter.paragraphs)
+    computed: Any = SimpleNamespace(case=sector, agreement=None, onsets_damped=nothing)
+    assert Outcome(None, (), computed).verdict == "no onset in range, in motions alike in all sectors"
+
+
+def test_a_body_has_the_article_of_its_shape() -> None:
+    case = st.loads(
+        """[materials.a]
+young_modulus = 2e11
+density = 7800.0
+poisson_ratio = 0.3
+[bodies.ring]
+type = "solid"
+model = "plane stress"
+material = "a"
+mesh = { shape = "annulus", inner_radius = 0.05, outer_radius = 0.1, divisions = [2, 24] }
+[bodies.bar]
+type = "solid"
+model = "plane stress"
+material = "a"
+mesh = { shape = "rectangle", corner = [0.0, 0.0], size = [0.1, 0.01], divisions = [2, 2] }
+"""
+    )
+    ring, bar = (body_words(case, name, body) for name, body in case.bodies.items())
+    assert ", an annulus, " in ring
+    assert ", a rectangle, " in bar
+
+
+def test_shares_of_bodies_are_plain_per_cents(monkeypatch: pytest.MonkeyPatch) -> None:
+    sizes = {"caliper": 4.0, "pin": 1.8244, "disc": 0.0084, "wedge": 4.0e-7, "held": 0.0}
+    shapes = {name: np.array([[0.0, 0.0], [size, 0.0]]) for name, size in sizes.items()}
+    monkeypatch.setattr(surface_figures, "mode_shape", lambda system, vector: shapes)
+    said = surface_figures._shares(SimpleNamespace(), np.zeros(0))  # ty: ignore[invalid-argument-type]
+    told = "caliper 100 %, pin 46 %, disc 0.21 %, wedge 1.0 · 10⁻⁵ %, held 0 %"
+    assert said == f"Largest amplitude of each body: {told}."

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..agreement import PartStore, dominant_response, last_rate, modal_assurance, settled_velocity
 from ..asking import FUNCTION, PATH, STORE, SWITCH, takes
+from ..case.repeating import in_alike, repeating
 from ..digits import measured
 from ..errors import CaseError, StridorError
 from ..io.atomic import write_text
@@ -75,7 +76,7 @@ class Outcome(Shown):
         if onsets.at_start:
             return "; ".join(onsets.at_start_words)
         if onsets.first is None:
-            return "no onset in range"
+            return in_alike("no onset in range", repeating(self.everything.case.ties))
         first = onsets.first
         return (
             f"modal onset at μ = {measured(first.mu, 5)}, {measured(first.frequency_hz, 1)} Hz; no comparison was made"

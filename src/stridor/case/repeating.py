@@ -31,6 +31,15 @@ def of_alike(claim: str, paths: tuple[str, ...]) -> str:
     return f"{claim} All of that is of {ALIKE} alone ({', '.join(paths)})." if claim and paths else claim
 
 
+def in_alike(sentence: str, paths: tuple[str, ...]) -> str:
+    """A sentence, or a headline without its full stop, limited to what is computed where bodies repeat by these ties;
+    an empty one stays empty."""
+    if not (sentence and paths):
+        return sentence
+    stop = "." if sentence.endswith(".") else ""
+    return f"{sentence.removesuffix('.')}, in {ALIKE}{stop}"
+
+
 def is_of_alike(claim: str) -> bool:
     """Whether `of_alike` limits a claim."""
     return ALIKE in claim

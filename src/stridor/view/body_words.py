@@ -34,7 +34,7 @@ def body_words(case: Case, name: str, body: AnyBody) -> str:
     if isinstance(body, ObstacleBody):
         return f"{name}: a rigid {body.shape}{_sliding_words(body.sliding)}."
     if isinstance(body, SolidBody):
-        source = f"the mesh file {Path(body.file).name}" if body.file else f"a {body.mesh.shape}" if body.mesh else ""
+        source = f"the mesh file {Path(body.file).name}" if body.file else _a(body.mesh.shape) if body.mesh else ""
         made = "" if body.material is None else f", {_material_words(case, body.material)}"
         return f"{name}: a solid ({body.model}), {source}{made}, {body.mass} mass{_sliding_words(body.sliding)}."
     if isinstance(body, MatrixBody):
@@ -48,6 +48,10 @@ def body_words(case: Case, name: str, body: AnyBody) -> str:
         f"({body.start[0] / unit:g}, {body.start[1] / unit:g}) {its_name} at "
         f"{np.degrees(np.arctan2(y, x)):.4g}° to the x axis; {body.elements} elements, {body.mass} mass."
     )
+
+
+def _a(shape: str) -> str:
+    return f"{'an' if shape[0] in 'aeiou' else 'a'} {shape}"
 
 
 def _material_words(case: Case, name: str) -> str:

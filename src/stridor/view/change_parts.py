@@ -6,15 +6,13 @@ from collections.abc import Iterator
 
 from ..case import Case
 from ..digits import measured
-from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onset
 from .inputs import ReportInputs
+from .origins import Origin, origin
 from .page_parts import ReportFigure
 from .sensitivity_plots import countermeasure_bars, sensitivity_bars
 from .sensitivity_tables import countermeasure_table, sensitivity_table
 from .tables import Table, TableRow, quantity
-
-NEAR = 0.05  # of the frequency: an onset whose modes have no numbers belongs to a mode within it
 
 
 def mechanism_table(inputs: ReportInputs) -> Table | None:
@@ -25,20 +23,18 @@ def mechanism_table(inputs: ReportInputs) -> Table | None:
         return None
     mu = float(modes.mu[0])
     growing = [b for b in modes.order(0, "growth") if modes.unstable[0, b]]
-    begun = [o for o in onsets.onsets if o.mu <= mu and not o.stabilising]
+    sweep = inputs.damped_sweep if modes.damped else inputs.undamped_sweep
     rows: list[TableRow] = []
     for b in growing:
-        found = [o for o in begun if _belongs(o, modes, int(b))]
-        last = found[-1] if found else None
-        words = _words(last) if last else f"no onset of it below μ = {mu:g}: it grows from the lowest μ on"
+        found, own = origin(onsets, modes, int(b), sweep), int(modes.branch[b])
         rows.append(
             TableRow(
                 (
-                    str(int(modes.branch[b])),
+                    str(own),
                     quantity(float(modes.frequency_hz[0, b]), 1),
                     quantity(float(modes.growth_rate[0, b]), 1),
-                    measured(last.mu, 4) if last else "",
-                    words,
+                    "" if found.onset is None else measured(found.onset.mu, 4),
+                    _how(found, own, onsets.friction_range[0]),
                 )
             )
         )
@@ -49,11 +45,14 @@ def mechanism_table(inputs: ReportInputs) -> Table | None:
     return Table("mechanisms", "What makes it grow", heads, tuple(rows), frozenset({4}), caption)
 
 
-def _belongs(onset: Onset, modes: ComplexModes, column: int) -> bool:
-    if any(onset.branches):
-        return int(modes.branch[column]) in onset.branches
-    frequency = float(modes.frequency_hz[0, column])
-    return abs(onset.frequency_hz - frequency) <= NEAR * max(frequency, 1e-300)
+def _how(found: Origin, own: int, low: float) -> str:
+    """How a mode comes to grow; own: its number at the friction of the case."""
+    if found.onset is None:
+        if found.from_start:
+            return f"no onset: it grows from the lowest μ, {low:g}, on"
+        return "not told: no onset that was found leads to it"
+    other = found.number is not None and found.number != own and any(found.onset.branches)
+    return _words(found.onset) + (f"; numbered over friction it is mode {found.number}" if other else "")
 
 
 def _words(onset: Onset) -> str:

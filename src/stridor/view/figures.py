@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from ..digits import measured
 from ..modal.complex_modes import ComplexModes
 from ..modal.onsets import Onset
+from ..notebook import counted
 from . import plots
 from .inputs import ReportInputs
 from .page_parts import ReportFigure
@@ -151,13 +154,21 @@ def _all_branches(inputs: ReportInputs) -> Iterator[ReportFigure]:
     ):
         if modes is None or len(modes.mu) < 2 or (name == "frequencies-damped" and inputs.undamped_sweep is not None):
             continue
-        shown = int((modes.frequency_hz.min(axis=0) <= inputs.max_frequency_hz).sum())
+        # NaN: nothing was solved, or the branch was not followed, as where other nodes touch or beyond the band.
+        inside = (modes.frequency_hz <= inputs.max_frequency_hz).any(axis=0)
+        shown = int(inside.sum())
+        if not shown:
+            continue
+        parted = bool(np.isnan(modes.frequency_hz[modes.solved][:, inside]).any())
+        first = "The first frequency" if shown == 1 else f"The first {shown} frequencies"
+        titled = f"Frequencies of {counted(shown, 'mode')}" if parted else first
         yield ReportFigure(
             name,
-            f"The first {shown} frequencies over friction, {inputs.damping_of(modes)}",
-            "Every line is one mode, followed from μ = 0 through crossings and coalescences. Circles: potentially "
-            "unstable (the mode grows). Diamonds: onsets, solved.",
-            f"Frequencies of {shown} modes over the friction coefficient with unstable stretches marked.",
+            f"{titled} over friction, {inputs.damping_of(modes)}",
+            "Every line is one mode, followed from μ = 0 through crossings and coalescences. "
+            + ("A line that ends was not followed any further, as where other nodes touch. " if parted else "")
+            + "Circles: potentially unstable (the mode grows). Diamonds: onsets, solved.",
+            f"Frequencies of {counted(shown, 'mode')} over the friction coefficient with unstable stretches marked.",
             plots.frequency_branches(modes, onsets=onsets, max_frequency_hz=inputs.max_frequency_hz),
         )
     if inputs.damped_sweep is not None and len(inputs.damped_sweep.mu) > 1:

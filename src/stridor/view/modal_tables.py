@@ -19,6 +19,7 @@ from .tables import (
     number,
     paired,
     percent,
+    powers,
     quantity,
     same_as_printed,
     significant,
@@ -73,7 +74,8 @@ def coupled_table(frequencies: Array, printed: tuple[ReferenceFrequency, ...], o
     """Frequencies in contact without friction; which of them meet where."""
     meets: dict[int, str] = {}
     for onset in reversed(onsets.onsets if onsets is not None else ()):
-        for branch in onset.branches:
+        # What diverges, or grows because other nodes touch, meets none.
+        for branch in set(onset.branches) if onset.kind == "flutter" and len(set(onset.branches)) > 1 else ():
             meets[branch] = f"μ = {measured(onset.mu, 4)}, {measured(onset.frequency_hz, 0)} Hz"
     rows: list[TableRow] = []
     for i, j in paired(frequencies, [p.frequency_hz for p in printed]):
@@ -232,10 +234,13 @@ def modes_table(modes: ComplexModes, mu: float, max_frequency_hz: float, damping
         TableRow(
             (
                 str(int(modes.branch[b])),
-                readable(float(modes.frequency_hz[row, b])).replace("-", "−"),
-                readable(
-                    float(modes.growth_rate[row, b]), zero=UNSTABLE_RELATIVE * abs(complex(modes.eigenvalues[row, b]))
-                ).replace("-", "−"),
+                powers(readable(float(modes.frequency_hz[row, b]))),
+                powers(
+                    readable(
+                        float(modes.growth_rate[row, b]),
+                        zero=UNSTABLE_RELATIVE * abs(complex(modes.eigenvalues[row, b])),
+                    )
+                ),
                 number(100 * float(modes.damping_ratio[row, b]), 4),
                 "unstable" if modes.unstable[row, b] else "stable",
                 significant(float(modes.residual[row, b]), 2),

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from ..case.repeating import in_alike, repeating
 from ..stages import passing, stage
 from .body_words import bodies_table
 from .change_parts import change_figures, change_tables, change_words, mechanism_table
@@ -155,7 +156,8 @@ def _modal(inputs: ReportInputs) -> Chapter:
         said.extend(f"{damping}: {note}" for note in onsets.notes)
         if not onsets.onsets:
             low, high = onsets.friction_range
-            said.append(f"{damping} there is no onset of instability for {low:g} ≤ μ ≤ {high:g}.")
+            none = f"{damping} there is no onset of instability for {low:g} ≤ μ ≤ {high:g}."
+            said.append(in_alike(none, repeating(inputs.case.ties)))
     if parts or said:
         said.insert(
             0,

@@ -14,7 +14,7 @@ from . import plots
 from .field_plots import contact_energies
 from .inputs import ReportInputs
 from .page_parts import ReportFigure
-from .tables import Table, TableRow, drop_empty, number, significant
+from .tables import Table, TableRow, drop_empty, number, quantity, significant
 from .units import most, pressure_unit
 
 
@@ -58,7 +58,7 @@ def _shares(system: System, vector: ComplexArray) -> str:
     most = max(sizes.values(), default=0.0)
     if most == 0.0 or len(sizes) < 2:
         return ""
-    shares = ", ".join(f"{name} {100 * size / most:.2g} %" for name, size in sizes.items())
+    shares = ", ".join(f"{name} {quantity(100 * size / most, 0, 2)} %" for name, size in sizes.items())
     return f"Largest amplitude of each body: {shares}."
 
 

@@ -58,16 +58,18 @@ def number(value: float | None, digits: int = 1) -> str:
     return (text if float(text) != 0 else f"{0.0:.{digits}f}").replace("-", "−")
 
 
-def quantity(value: float | None, decimals: int = 1) -> str:
-    """A number with a unit: so many decimals, more where a small one would lose its digits; empty for None."""
-    return "" if value is None or not np.isfinite(value) else measured(value, decimals).replace("-", "−")
+def quantity(value: float | None, decimals: int = 1, digits: int = 3) -> str:
+    """A number with a unit: so many decimals, more where a small one would keep fewer digits; empty for None."""
+    return "" if value is None or not np.isfinite(value) else powers(measured(value, decimals, digits))
 
 
 def significant(value: float | None, digits: int = 4) -> str:
     """A number with so many significant digits, powers of ten written out; empty for None."""
-    if value is None or not np.isfinite(value):
-        return ""
-    text = f"{value:.{digits}g}"
+    return "" if value is None or not np.isfinite(value) else powers(f"{value:.{digits}g}")
+
+
+def powers(text: str) -> str:
+    """A number of Python with powers of ten written out and a true minus sign: "-2.50e-07" is "−2.50 · 10⁻⁷"."""
     if "e" in text:
         mantissa, exponent = text.split("e")
         power = f"10{str(int(exponent)).translate(_SUPERSCRIPTS)}"

@@ -10,6 +10,7 @@ import numpy as np
 from ..agreement import GOOD_FREQUENCY, GOOD_GROWTH, stronger_below
 from ..case import Case
 from ..case.matrix_checks import MU
+from ..case.repeating import in_alike, of_alike, repeating
 from ..case.schema import Load
 from ..digits import measured
 from ..study.run_summary import slower_is_stronger
@@ -34,21 +35,25 @@ class Verdict:
 
 
 def verdict(inputs: ReportInputs) -> Verdict:
-    """Will it squeal, at which frequency, from which friction on, and do both approaches say so?"""
+    """Will it squeal, at which frequency, from which friction on, and do both approaches say so? Where bodies repeat,
+    what is said is of the motions that are computed, and the denials say so themselves."""
+    alike = repeating(inputs.case.ties)
     growing = _growing(inputs)
     at = f" at μ = {inputs.mu:g}" if inputs.mu is not None and _rubs(inputs.case) else ""
     agreement = inputs.agreement
     agrees = None if agreement is None else agreement.agree
     state = f"Steady sliding{at}" if inputs.case.contacts else f"The structure{at}"
     parts = [
-        _modal_sentence(growing, state), _onset_sentence(inputs), _run_sentence(inputs), _agreement_sentence(inputs),
+        _modal_sentence(growing, state), in_alike(_onset_sentence(inputs), alike), _run_sentence(inputs),
+        _agreement_sentence(inputs),
     ]  # fmt: skip
-    paragraph = " ".join(part for part in parts if part)
+    paragraph = of_alike(" ".join(part for part in parts if part), alike)
     squeals = None if growing is None else bool(growing)
     if growing is None:
         return Verdict(_undecided(inputs), paragraph, None, agrees)
     if not growing:
-        return Verdict(f"It does not squeal{at} up to {_top(inputs)}", paragraph, squeals, agrees)
+        calm = in_alike(f"It does not squeal{at} up to {_top(inputs)}", alike)
+        return Verdict(calm, paragraph, squeals, agrees)
     if inputs.unsaturated is not None:
         still = inputs.unsaturated
         hz = measured(still.frequency_hz, 0)
@@ -65,7 +70,8 @@ def _undecided(inputs: ReportInputs) -> str:
     onsets = inputs.onsets
     first = None if onsets is None else onsets.first
     if first is not None:
-        return f"It may squeal from μ = {measured(first.mu, 4)} on, at {measured(first.frequency_hz, 0)} Hz"
+        sentence = f"It may squeal from μ = {measured(first.mu, 4)} on, at {measured(first.frequency_hz, 0)} Hz"
+        return in_alike(sentence, repeating(inputs.case.ties))
     return "Not decided: no modes at the friction of the case"
 
 
