@@ -92,11 +92,24 @@ def test_of_several_onsets_at_one_frequency_that_of_the_mode_is_told() -> None:
 def test_growth_that_opens_slowly_goes_back_to_the_onset_of_its_mode() -> None:
     known = modes(MU, [[-9], [-1], [-1e-9], [-1e-9], [5], [9]], [[9000]] * 6, (2,))
     own = modes([0.4], [[5]], [[9000]], (2,))
-    flutter = onset(0.15, 8e3, (2, 3), "flutter")
-    words = "flutter: modes 2 and 3 come together at 8000 Hz and exchange energy through friction"
+    flutter = onset(0.15, 8.9e3, (2, 3), "flutter")
+    words = "flutter: modes 2 and 3 come together at 8900 Hz and exchange energy through friction"
     assert told((flutter,), own, known) == [("0.1500", words)]
-    again = onset(0.17, 8e3, (2, 3), "flutter", ends=True)
+    again = onset(0.17, 8.9e3, (2, 3), "flutter", ends=True)
     assert told((flutter, again), own, known) == [("", "not told: no onset that was found leads to it")]
+    other = onset(0.15, 5e3, (2, 3), "flutter")
+    assert told((other,), own, known) == [("", "not told: no onset that was found leads to it")]
+
+
+def test_numbers_tell_as_long_as_the_same_nodes_touch() -> None:
+    """Growth sets in at another frequency than it has at the next μ of a coarse sweep."""
+    known = modes(MU, [[-9]] * 3 + [[5]] * 3, [[9000]] * 3 + [[8000]] * 3, (2,))
+    own = modes([0.4], [[5]], [[8000]], (2,))
+    flutter = onset(0.25, 9e3, (2, 3), "flutter")
+    words = "flutter: modes 2 and 3 come together at 9000 Hz and exchange energy through friction"
+    assert told((flutter,), own, known) == [("0.2500", words)]
+    touching = onset(0.1, 700, (4, 4))
+    assert told((touching, flutter), own, known) == [("", "not told: no onset that was found leads to it")]
 
 
 def test_what_grows_because_other_nodes_touch_meets_no_other_mode() -> None:

@@ -44,19 +44,18 @@ def origin(onsets: Onsets, modes: ComplexModes, column: int, sweep: ComplexModes
     """Where the mode of a column begins to grow, which does so at the first μ of ``modes``; sweep: modes over the range
     of friction, of the same damping."""
     begun = [o for o in onsets.onsets if o.mu <= float(modes.mu[0]) and not o.stabilising]
+    renumbered = any(o.kind == "contact" for o in onsets.onsets)  # other nodes touch at other μ
     growth = _growth(modes, column, sweep)
     if growth is None:
         own, frequency = int(modes.branch[column]), float(modes.frequency_hz[0, column])
-        renumbered = any(o.kind == "contact" for o in onsets.onsets)  # other nodes touch at other μ
         found = [
             o
             for o in begun
             if (own in o.branches if any(o.branches) and not renumbered else _near(o.frequency_hz, frequency))
         ]
         return _told(found[-1] if found else None, onsets, frequency, None)
-    found = _between(begun, growth)
-    if found is None and growth.number is not None:
-        found = _earlier(onsets, growth.number, growth.lowest)
+    known = None if renumbered else growth.number
+    found = _between(begun, growth, known) or _earlier(onsets, growth)
     if growth.below is not None:
         return Origin(found, from_start=False, number=growth.number)
     return _told(found, onsets, growth.frequency_hz, growth.number)
@@ -89,20 +88,23 @@ def _growth(modes: ComplexModes, column: int, sweep: ComplexModes | None) -> _Gr
     return _Growth(lowest, None, frequency, number)
 
 
-def _between(begun: Sequence[Onset], growth: _Growth) -> Onset | None:
-    """The onset that lies where the mode begins to grow: of several the nearest in frequency."""
-    if growth.below is None:
-        inside = [o for o in begun if o.mu <= growth.lowest]
-    else:
-        inside = [o for o in begun if growth.below <= o.mu <= growth.lowest]
-    own = [o for o in inside if growth.number in o.branches or _near(o.frequency_hz, growth.frequency_hz)]
+def _between(begun: Sequence[Onset], growth: _Growth, number: int | None) -> Onset | None:
+    """The onset that lies where the mode begins to grow: of several the nearest in frequency. number: that of the mode
+    among those of the onsets, None where it does not tell."""
+    low = -np.inf if growth.below is None else growth.below
+    inside = [o for o in begun if low <= o.mu <= growth.lowest]
+    own = [o for o in inside if number in o.branches or _near(o.frequency_hz, growth.frequency_hz)]
     return min(own, key=lambda o: abs(o.frequency_hz - growth.frequency_hz), default=None)
 
 
-def _earlier(onsets: Onsets, number: int, mu: float) -> Onset | None:
+def _earlier(onsets: Onsets, growth: _Growth) -> Onset | None:
     """The onset of a mode whose growth opens so slowly that it is rounding at the next μ of the sweep: the last change
-    of the mode up to μ, unless growth ends there."""
-    own = [o for o in onsets.onsets if o.mu <= mu and number in o.branches]
+    of the mode up to where it grows, unless growth ends there."""
+    own = [
+        o
+        for o in onsets.onsets
+        if o.mu <= growth.lowest and growth.number in o.branches and _near(o.frequency_hz, growth.frequency_hz)
+    ]
     return own[-1] if own and not own[-1].stabilising else None
 
 
