@@ -448,3 +448,15 @@ def test_lengths_that_press_have_derivatives_at_zero(changes, path):
     size = np.abs(true).max()
     assert size > 1e3
     assert np.abs(found.derivative[0] - true[: found.derivative.shape[1]]).max() < 1e-2 * size
+
+
+@pytest.mark.parametrize(("path", "small"), [("contacts.A.cubic", 1e20), ("springs.lean.cubic", 1e12)])
+def test_cubic_terms_of_zero_have_an_effect(path, small):
+    """A thousandth of a unit of them is rounding beside the stiffness; the truth is the derivative a little off zero."""
+    model = loads(LEANING)
+    found = sensitivities(model, [path], mu=0.15, modes="all")
+    beside = sensitivities(model.with_({path: small}), [path], mu=0.15, modes="all")
+    size = np.abs(beside.derivative[0]).max()
+    assert size * small > 1e-6
+    assert np.abs(found.derivative[0] - beside.derivative[0]).max() < 1e-3 * size
+    assert not any("no effect" in line for line in found.warnings)

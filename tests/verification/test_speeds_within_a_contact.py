@@ -14,6 +14,7 @@ import scipy.linalg as sl
 
 import stridor as st
 from stridor.case import Case
+from stridor.errors import CaseError
 from stridor.sliding import full_motion
 from stridor.study.workspace import Workspace
 
@@ -210,3 +211,16 @@ def test_a_boundary_over_mu_and_spin_is_where_modes_begin_to_grow(block: Case) -
         middle = len(curve.x) // 2
         lam = truth(block.with_({SPIN: float(curve.y[middle])}), float(curve.x[middle])).values
         assert np.abs(lam.real).min() < 1e-5 * np.abs(lam).max()
+
+
+def test_a_law_that_is_zero_at_the_mean_speed_alone_has_no_mu_of_its_own() -> None:
+    """No factor makes another coefficient of it; 0 for all of its nodes would leave out what some of them rub with."""
+    speeds = st.build_system(st.loads(BLOCK)).contact_nodes().speed
+    mean = float(speeds.mean())
+    table = {"law": "table", "speeds": [0.0, 0.5 * (speeds.min() + mean), mean], "coefficients": [0.6, 0.4, 0.0]}
+    model = st.loads(BLOCK).with_({"contacts.A.friction": table})
+    assert st.steady_sliding(model).friction_coefficient.max() > 0.1
+    for ask in (st.modes, st.compare):
+        with pytest.raises(CaseError, match=r"the law of A gives no friction at the mean slip speed .* name it"):
+            ask(model)
+    assert st.modes(model, 0.3).solved.all()

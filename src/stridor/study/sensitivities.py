@@ -280,7 +280,7 @@ class Linearised:
 
         try:
             value, step = self.value(path), step or self._step(path)
-            scale = None if value or step else self._yielding() if compliance else self._displaced(path)
+            scale = None if value or step else self._yielding() if compliance else self._natural(path)
             if scale:
                 found = rate_from_zero(at, scale, base=self.pencil)
             else:
@@ -318,12 +318,19 @@ class Linearised:
         shapes = steps[0] == "bodies" and is_of_shape(self.case, steps)
         return SHAPE_STEP * (abs(self.value(path)) or 1.0) if shapes else None
 
-    def _displaced(self, path: str) -> float:
-        """How far bodies move in steady sliding [m], where a number is a length by which something is pressed: as far
-        from zero changes all contact forces. 0.0 of other numbers."""
-        if not is_of_shape(self.case, split_path(path)):
+    def _natural(self, path: str) -> float:
+        """What is no longer small of a number at zero on which steady sliding depends, δ being how far bodies move in
+        that [m]: of a length by which something is pressed δ, of a cubic term that beside a stiffness k, k/δ². 0.0 of
+        other numbers, and where nothing moves."""
+        steps = split_path(path)
+        cubic, length = steps[-1] == "cubic", is_of_shape(self.case, steps)
+        if not (cubic or length):
             return 0.0
-        return float(np.abs(steady_nodes(self.system, self.mu, self.options.solver).displacement).max(initial=0.0))
+        moved = float(np.abs(steady_nodes(self.system, self.mu, self.options.solver).displacement).max(initial=0.0))
+        if length or not moved:
+            return moved
+        beside = getattr(getattr(self.case, steps[0])[steps[1]], "stiffness", None)
+        return float(beside) / moved**2 if isinstance(beside, float | int) else 0.0
 
     def _yielding(self) -> float:
         """A compliance of contact [m³/N, m/N of a point] with which bodies come as near as they move in steady

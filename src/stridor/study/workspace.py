@@ -281,8 +281,10 @@ class Unsaved(Workspace):
 
 
 def friction_in_sliding(system: System) -> float | None:
-    """The coefficient of all contacts of a system at their mean slip speeds in steady sliding; None where they
-    differ."""
+    """The coefficient of all contacts of a system at their mean slip speeds in steady sliding; None where they differ,
+    and where none says what a law makes of its nodes."""
+    if untold_by_mean(system):
+        return None
     found = np.array(list(frictions_by_contact(system).values()))
     if not len(found):
         return 0.0
@@ -296,6 +298,12 @@ def _one(coefficients: Array) -> bool:
 
 def different_friction(system: System) -> str:
     """Which contacts have different coefficients in steady sliding, and what to do."""
+    if untold := untold_by_mean(system):
+        return (
+            f"the law of {', '.join(untold)} gives no friction at the mean slip speed of its nodes, and some at that of "
+            "others, which no factor tells: name it (--mu 0.3), every contact with friction then has it; `steady` and "
+            "`simulate` without μ answer with those of the law"
+        )
     return f"the case gives them different ones: name it (--mu 0.3), every contact with friction then has it; {KEPT_BY}"
 
 
@@ -308,9 +316,21 @@ def frictions_by_contact(system: System) -> dict[str, float]:
     return {name: law.sliding(v) for k, (name, law, v) in enumerate(every) if k in rubbing}
 
 
+def untold_by_mean(system: System) -> list[str]:
+    """Contacts whose law is zero at the mean slip speed of their nodes, and is not at that of some of them."""
+    nodes = system.contact_nodes()
+    own, found = nodes.friction_coefficients(nodes.speed), list[str]()
+    for k, (name, law, v) in enumerate(zip(nodes.names, nodes.laws, nodes.mean_speed, strict=True)):
+        if not law.constant and law.sliding(v) == 0.0 and np.any(own[nodes.rubs & (nodes.owner == k)] > 0.0):
+            found.append(name)
+    return found
+
+
 def in_proportion(system: System) -> tuple[System, float] | None:
     """The system whose contacts keep their coefficients to one another at any μ, and the μ, that of the largest, at
-    which they have their own; None where none has friction."""
+    which they have their own; None where none has friction, and where none says what a law makes of its nodes."""
+    if untold_by_mean(system):
+        return None
     own, nodes = frictions_by_contact(system), system.contact_nodes()
     largest = max(own.values(), default=0.0)
     if not largest:

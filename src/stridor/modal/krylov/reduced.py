@@ -21,8 +21,9 @@ import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 
+from ...errors import FollowingError
 from ...typing import Array, ComplexArray, Sparse
-from ..at_rest import moving, rest_limit
+from ..at_rest import double_zeros, more_slow, moving, rest_limit, slow_words
 from ..dense_problem import DenseProblem, Eigenpairs, combined
 from .problem import ContactProblem, Extras, Varying
 from .shifted import ForcedShapes, Shifted, orthonormal, real_columns
@@ -61,6 +62,7 @@ class Reduced(DenseProblem):
         self._extra: dict[float, tuple[Array, Array]] = {}
         self._grid: list[tuple[Array, Array]] | None = None
         self._lift_scale = 1.0
+        self._told: dict[int, bool] = {}  # by how many zeros: whether there are slow modes among them
         self._kept: list[tuple[Array, Array, float]] = []  # parts on pairs and on forces, and how well they are known
         self.add(modes)
         self._modes = self.compressed = self.pairs.count
@@ -290,12 +292,18 @@ class Reduced(DenseProblem):
 
     def _resting(self, found: Eigenpairs) -> Eigenpairs:
         """With zeros for what is zero but for rounding, where some motion has no stiffness: whether rounding makes it
-        grow says nothing."""
+        grow says nothing. Raises FollowingError where there is more of it than such motions: slow modes, among them."""
         if not self.damped:
             return found
         moves = moving(found.values, self.frequency, lambda: self.rest_limit)
         if np.all(moves):
             return found
+        slow = found.values[~moves]
+        if (zeros := double_zeros(slow)) not in self._told:
+            problem = self.problem.pencil(self.high).condensed()
+            self._told[zeros] = more_slow(problem, slow, self.frequency, self.problem.solver)
+        if self._told[zeros]:
+            raise FollowingError(f"there are {slow_words(self.rest_limit)}")
         values = np.where(moves, found.values, 0.0)
         return replace(found, values=values, coordinate=values)
 
