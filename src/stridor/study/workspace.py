@@ -301,8 +301,8 @@ def different_friction(system: System) -> str:
     if untold := untold_by_mean(system):
         return (
             f"the law of {', '.join(untold)} gives no friction at the mean slip speed of its nodes, and some at that "
-            "of others, which no factor tells: name it (--mu 0.3), every contact with friction then has it; `steady` and "
-            "`simulate` without μ answer with those of the law"
+            "of others, which no factor tells: name it (--mu 0.3), every contact with friction then has it; `steady` "
+            "and `simulate` without μ answer with those of the law"
         )
     return f"the case gives them different ones: name it (--mu 0.3), every contact with friction then has it; {KEPT_BY}"
 
