@@ -18,7 +18,7 @@ from ..typing import BoolArray, ComplexArray, Sparse
 from .backward_error import BackwardError
 from .coupling import PointCoupling
 from .full.family import Family
-from .histories import Entries, StabilityChange, imbalance, once_each, reported, unexplained
+from .histories import Entries, StabilityChange, imbalance, once_each, reported, unexplained, without_crossings
 from .meeting import partner_of
 from .newton import Root, crossing, exceptional, meeting, standstill
 from .onset import Branches, Onset, Onsets
@@ -99,6 +99,7 @@ def onsets_by_receptance(
         for k, event in enumerate(events)
         if event.mu > 0.0 or event.branch in grown  # growth that stays within rounding all over the range is none
     ]
+    passed = [passed[k] for k in without_crossings([change for change, _ in passed])]
     changes = [change for change, _ in passed]
     return Onsets(
         tuple(reported(changes, entries, (low, high), max_frequency_hz)),

@@ -16,6 +16,7 @@ import numpy as np
 from ...typing import ComplexArray
 from ..at_rest import moving
 from ..dense_problem import eigenvalues
+from ..histories import crossings
 from ..krylov.exceptional import exceptional_point
 from ..krylov.follow import BranchState
 from ..krylov.passages import Passage
@@ -116,7 +117,8 @@ def solved(
             one = replace(one, onset=replace(one.onset, enters_at=entry))
         if not any(_same(one.onset, other.onset, family) for other in found):
             found.append(one)
-    found = without_crossings(found)
+    crossed = crossings([f.onset for f in found])
+    found = [f for k, f in enumerate(found) if k not in crossed]
     inside = (f.onset for f in found if between[0] <= f.onset.mu <= between[1])
     balance += sum(o.roots for o in inside)
     explained = _explained(lost)
@@ -126,25 +128,6 @@ def solved(
         _agree(family, state, end, top, fast) for state, end in zip((way.low, way.high), ends, strict=True)
     )
     return found, way, agree and explained and growing[1] - growing[0] == balance
-
-
-def without_crossings(found: list[BranchOnset]) -> list[BranchOnset]:
-    """Without undamped modes that cross: rounding makes them meet and part again at one place, and grow in between by
-    no more than rounding, κ√Δμ at most."""
-    crossings: set[int] = set()
-    for k, one in enumerate(found):
-        for m, other in enumerate(found):
-            begins, ends = one.onset, other.onset
-            if begins.stabilising or not ends.stabilising or begins.branches != ends.branches:
-                continue
-            opens, closes = begins.square_root_coefficient, ends.square_root_coefficient
-            if m in crossings or opens is None or closes is None:
-                continue
-            grows = max(opens, closes) * np.sqrt(max(ends.mu - begins.mu, 0.0))
-            if ends.mu >= begins.mu and grows <= SPLIT_RELATIVE * 2 * np.pi * begins.frequency_hz:
-                crossings |= {k, m}
-                break
-    return [one for k, one in enumerate(found) if k not in crossings]
 
 
 def _concerned(passage: Passage) -> tuple[int, ...]:
