@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import stridor as st
+from stridor.modal.options import Options
 from stridor.modal.over_friction import modes_of_band, onsets_of_band
 from stridor.system import System
 
@@ -39,3 +40,10 @@ def test_divergence_beside_zero_roots(masses: tuple[float, float], beyond: float
 def test_modes_at_and_beyond_the_place_where_all_are_zero() -> None:
     found = modes_of_band(free(2.0, 1.0), [0.0, 1.5, 2.0], TOP)
     assert np.nanmax(found.eigenvalues.real, axis=1) == pytest.approx([0.0, 0.0, np.sqrt(0.5)], abs=1e-4)
+
+
+def test_what_rounding_makes_of_four_zero_roots_did_not_begin_above_the_band() -> None:
+    """A range that ends there, in the full problem: a pair grows by rounding, where the onset says one root."""
+    found = onsets_of_band(free(1.0, 1.0), (0.0, 2.0), TOP, options=Options(source="full"))
+    assert not found.complete
+    assert "began above" not in found.completeness

@@ -36,6 +36,7 @@ from .passages import located, quiet
 ALIKE = 1e-8  # of |λ|: eigenvalues that are one
 SAME = 1e-5  # of the highest frequency: a mode of the low end as it is found twice, on a basis and in the full problem
 OPENING = 1e-6  # of the range: passages that close to where growth opens are that
+BORDERS = 1e-6  # of the band: modes so near its end may count on either side
 CLEARLY = 1.02  # times the band: passages beyond it are counted and not solved
 
 
@@ -120,14 +121,33 @@ def solved(
     crossed = crossings([f.onset for f in found])
     found = [f for k, f in enumerate(found) if k not in crossed]
     inside = (f.onset for f in found if between[0] <= f.onset.mu <= between[1])
-    balance += sum(o.roots for o in inside)
+    said = sum(o.roots for o in inside)
+    balance += said
     explained = _explained(lost)
     growing = [growing_roots(state.values[unstable(family, state.values, top)]) for state in (way.low, way.high)]
     fast = _throughout(family, (way.low, way.high), ends, top)
     agree = all(
         _agree(family, state, end, top, fast) for state, end in zip((way.low, way.high), ends, strict=True)
     )
+    agree = agree and _across_known(family, way, ends, top, said)
     return found, way, agree and explained and growing[1] - growing[0] == balance
+
+
+def _across_known(
+    family: Family, way: Followed, ends: tuple[RegionModes, RegionModes], top: float, said: int
+) -> bool:  # fmt: skip
+    """Whether roots that grow in the band at one end and not at the other, beside the ``said`` of the onsets, may have
+    passed its border: something grows beyond it then at an end, or begins or ceases to."""
+    counts = [growing_roots(end.values[unstable(family, end.values, top)]) for end in ends]
+    if counts[1] - counts[0] == said:
+        return True
+    border = (1 - BORDERS) * top
+    beyond = any(
+        np.any(state.values[unstable(family, state.values, top)].imag > border)
+        or np.any(np.abs(end.values[unstable(family, end.values, top)]) > border)
+        for state, end in zip((way.low, way.high), ends, strict=True)
+    )
+    return bool(beyond) or any(_is_above(passage, border) for passage in way.passages)
 
 
 def _concerned(passage: Passage) -> tuple[int, ...]:
