@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import stridor as st
@@ -72,6 +73,28 @@ def test_a_mass_on_more_flats_than_it_has_freedoms(normals: list[tuple[float, fl
         with pytest.raises(AnalysisError) as caught:
             call(case)
         assert str(caught.value) == TWICE + said + TAIL + where
+
+
+def test_without_a_load() -> None:
+    """All contacts count as touching then, and no steady sliding is solved that would tell."""
+    friction = {"law": "coulomb", "coefficient": 0.5}
+    normal = [-1.0, 1.0, 0.0]
+    contacts = {
+        "A": {"normal": normal, "tangent": [0, 1, 0], "stiffness": "rigid", "friction": friction, "slip": -1.0},
+        "B": {"normal": normal, "tangent": [0, 0, 1], "stiffness": "rigid", "friction": friction, "slip": 1.0},
+    }
+    system = st.System.from_matrices(np.eye(3), None, 4 * np.eye(3), contacts=contacts)
+    said = TWICE + "1 of the 2 conditions of rigid contact follows from the others (contacts.A, contacts.B)" + TAIL
+    for source in ("receptance", "krylov", "full"):
+        bench = st.Workspace(system, modal={"source": source, "max_frequency_hz": 10.0})
+        for call in (
+            lambda w: st.modes(w, 0.5, max_frequency_hz=10.0),
+            lambda w: st.modes(w, [0.0, 0.5], max_frequency_hz=10.0),
+            lambda w: st.onsets(w, (0.0, 0.5), max_frequency_hz=10.0),
+        ):
+            with pytest.raises(AnalysisError) as caught:
+                call(bench)
+            assert str(caught.value) == said
 
 
 def test_as_many_as_it_has_freedoms_are_told_apart() -> None:

@@ -59,13 +59,18 @@ def system(request) -> System:
 def test_eigenvalues_match_the_full_pencil(system, damped):
     mu = np.array([0.0, 0.1, 0.45])
     modes = complex_modes(system, mu, max_frequency_hz=30e3, damped=damped)
-    assert modes.residual.max() < 1e-9
+    # Of two real branches that have become a pair, one is NaN.
+    known = np.isfinite(modes.eigenvalues)
+    assert modes.residual[known].max() < 1e-9
+    assert np.array_equal(known, np.isfinite(modes.residual))
+    assert np.all(modes.eigenvalues[known].imag >= 0)
     reference = system if damped else system.undamped()
     for row, m in enumerate(mu):
         dense = full_eigenvalues(reference, m)
         # The dense answer's error is relative to the largest eigenvalue (undamped: to its square).
-        loss = 1e-14 * np.abs(dense).max() ** 2 / np.abs(modes.eigenvalues[row]) ** 2
-        assert np.all(distance_to(modes.eigenvalues[row], dense) < 1e-7 + loss)
+        found = modes.eigenvalues[row, known[row]]
+        loss = 1e-14 * np.abs(dense).max() ** 2 / np.abs(found) ** 2
+        assert np.all(distance_to(found, dense) < 1e-7 + loss)
         assert len(modes.branch) > 5
     # None is missing at μ = 0, none is there twice.
     dense = full_eigenvalues(reference, 0.0)

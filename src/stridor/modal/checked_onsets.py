@@ -147,6 +147,7 @@ def _sentence(found: Onsets, start: Growing, end: Growing, between: Between) -> 
             f"{'more' if found.unbalanced > 0 else 'fewer'} eigenvalues than the branches followed have at both ends"
         )
     wrong += _roots_amiss(found, start, end)
+    wrong += _ends_before(found, start)
     if wrong:
         return f"{NOT_COMPLETE}: {numbers}, but {'; '.join(wrong)}. {_advice(start, high)}"
     if not (start.complete and end.complete):
@@ -223,6 +224,18 @@ def _roots_amiss(found: Onsets, start: Growing, end: Growing) -> list[str]:
         f"{more:+d} eigenvalues grow from one to the other where the onsets say {said:+d}: a motion that does not "
         "oscillate begins or ceases to grow, or a mode leaves the band"
     ]
+
+
+def _ends_before(found: Onsets, start: Growing) -> list[str]:
+    """What is wrong where growth is said to end that had not begun."""
+    count = growing_roots(start.values) + 2 * len(found.entering)
+    if found.followed is not None:
+        count += growing_roots(_slow(found.followed[0][1], start))
+    for onset in found.onsets:
+        count += onset.roots
+        if count < 0:
+            return [f"growth of a mode that did not grow is said to end at μ = {onset.mu:.9g}"]
+    return []
 
 
 def _parted_words(found: Onsets, start: Growing, end: Growing) -> str:

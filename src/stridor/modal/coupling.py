@@ -26,6 +26,7 @@ from ..sliding import (
     force_rates,
     full_motion,
     least_force,
+    refuse_redundant,
     require_pressed,
     slip_speeds,
     steady_nodes,
@@ -164,6 +165,7 @@ def couple(system: System, *, mu: float | None = None) -> tuple[PointCoupling, t
         system = replace(system, contacts=touching)
         pulls = steady.pulls[closed]
     else:
+        refuse_redundant(system)
         pulls = np.zeros(len(system.contacts), dtype=bool)
     speeds = slip_speeds(system, velocities)
     sloped = any(c.law.slope(abs(float(v))) != 0.0 for c, v in zip(system.contacts, speeds, strict=True))

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from math import pi
 
 import numpy as np
 
 from ..typing import ComplexArray, IntArray
 from .onset import Onset
+from .tolerances import SPLIT_RELATIVE
 
 
 @dataclass(frozen=True)
@@ -140,9 +142,40 @@ def once_each(changes: Iterable[StabilityChange]) -> list[StabilityChange]:
     """The changes without those that are the same onset of the same branches once more."""
     kept: list[StabilityChange] = []
     for change in changes:
-        onset, branches = change.onset, set(change.branches)
-        if onset is None or not any(
-            other.onset is not None and set(other.branches) == branches and _same(onset, other.onset) for other in kept
-        ):
+        if not _is_one_of(change, kept):
             kept.append(change)
     return kept
+
+
+def _is_one_of(change: StabilityChange, others: Iterable[StabilityChange]) -> bool:
+    """Whether another change is the same onset of the same branches."""
+    onset, branches = change.onset, set(change.branches)
+    return onset is not None and any(
+        other.onset is not None and set(other.branches) == branches and _same(onset, other.onset) for other in others
+    )
+
+
+def crossings(onsets: Sequence[Onset]) -> set[int]:
+    """Places in ``onsets`` of those that are no more than undamped modes that cross: rounding makes them meet and part
+    again at one place, in either order, and what they do in between is rounding as well, growth of κ√Δμ at most."""
+    found: set[int] = set()
+    for k, begins in enumerate(onsets):
+        for m, ends in enumerate(onsets):
+            if begins.stabilising or not ends.stabilising or begins.branches != ends.branches:
+                continue
+            opens, closes = begins.square_root_coefficient, ends.square_root_coefficient
+            if m in found or opens is None or closes is None:
+                continue
+            grows = max(opens, closes) * np.sqrt(abs(ends.mu - begins.mu))
+            if grows <= SPLIT_RELATIVE * 2 * pi * begins.frequency_hz:
+                found |= {k, m}
+                break
+    return found
+
+
+def without_crossings(changes: Sequence[StabilityChange]) -> list[int]:
+    """Places of the changes that are left without modes that cross (`crossings`), found at both branches or at one."""
+    solved = [c for c in once_each(changes) if c.onset is not None]
+    onsets = [c.onset for c in solved if c.onset is not None]
+    gone = [solved[k] for k in crossings(onsets)]
+    return [k for k, change in enumerate(changes) if not _is_one_of(change, gone)]

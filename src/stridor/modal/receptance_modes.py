@@ -17,7 +17,7 @@ from .pencil import Pencil
 from .quadratic.inverse_iteration import solved_beside
 from .results import ComplexModes, Progress, at_each, require_memory
 from .roots import ReceptanceProblem, spectrum_of
-from .tolerances import BELIEVED
+from .tolerances import BELIEVED, UNSTABLE_RELATIVE
 from .tracking import Tracker
 from .unfit import Unfit
 from .vectors import closed, expand, fixed_vectors, modal_coordinates
@@ -82,7 +82,7 @@ def modes_by_receptance(
         columns = columns[inside[columns]]
     moving = np.flatnonzero(columns < len(start))
     still = np.flatnonzero(columns >= len(start))
-    eigenvalues = np.empty((len(values), len(columns)), dtype=complex)
+    eigenvalues: ComplexArray = np.empty((len(values), len(columns)), dtype=complex)
     eigenvalues[:, moving] = followed[:, columns[moving]]
     eigenvalues[:, still] = fixed[columns[still] - len(start)]
     judge = BackwardError(coupling)
@@ -107,6 +107,13 @@ def modes_by_receptance(
             )
     else:
         residual[:, moving] = np.nan
+    # Two real branches that meet become one pair: the one with Im λ ≥ 0 goes on, and the other is there no more.
+    partner = eigenvalues.imag < -UNSTABLE_RELATIVE * np.abs(eigenvalues)
+    if partner.any():
+        eigenvalues[partner], residual[partner], shapes[:, partner] = complex(np.nan, np.nan), np.nan, np.nan
+        there = np.flatnonzero(~np.all(partner, axis=0))
+        eigenvalues, residual, shapes = eigenvalues[:, there], residual[:, there], shapes[:, :, there]
+        columns = columns[there]
     return ComplexModes(
         mu=values,
         eigenvalues=eigenvalues,

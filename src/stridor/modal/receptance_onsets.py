@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import brentq
 
 from ..direct.light import LightFactor
 from ..errors import AnalysisError
@@ -18,7 +19,7 @@ from ..typing import BoolArray, ComplexArray, Sparse
 from .backward_error import BackwardError
 from .coupling import PointCoupling
 from .full.family import Family
-from .histories import Entries, StabilityChange, imbalance, once_each, reported, unexplained
+from .histories import Entries, StabilityChange, imbalance, once_each, reported, unexplained, without_crossings
 from .meeting import partner_of
 from .newton import Root, crossing, exceptional, meeting, standstill
 from .onset import Branches, Onset, Onsets
@@ -30,6 +31,7 @@ from .roots import ReceptanceProblem
 from .tolerances import BELIEVED, UNSTABLE_RELATIVE
 from .tracking import RootState, Tracker
 from .unfit import Unfit
+from .vectors import fixed_vectors
 
 NARROWINGS = 8
 ASTRAY = 0.1  # of μ
@@ -37,6 +39,7 @@ FIRST = 1e-5  # μ at which branches are begun with at most, beside the poles
 OPENS = 1e-3  # of what has opened there: growth that began without friction
 STANDS = 1e-13  # of |λ|: on the axis, but for rounding
 UNSURE = 2.0  # times the growth that counts
+ASIDE = 1e-3  # of a step: on both sides of a zero of λ², where its slope is taken
 STILL = 1e-6  # of |λ|: what swings slower diverges
 
 
@@ -99,6 +102,7 @@ def onsets_by_receptance(
         for k, event in enumerate(events)
         if event.mu > 0.0 or event.branch in grown  # growth that stays within rounding all over the range is none
     ]
+    passed = [passed[k] for k in without_crossings([change for change, _ in passed])]
     changes = [change for change, _ in passed]
     return Onsets(
         tuple(reported(changes, entries, (low, high), max_frequency_hz)),
@@ -190,6 +194,34 @@ def _growing_roots(state: RootState) -> int:
 
 def _growing(roots: ComplexArray, top: float) -> tuple[complex, ...]:
     return tuple(roots[_inside(roots, top)].tolist())
+
+
+def _vanishing(spectrum: ReceptanceProblem, family: Family, event: _Event) -> Root | None:
+    """Where λ² of an undamped branch goes through zero beside motions that no contact sees and no stiffness resists.
+
+    P(0) is singular at every μ then, and its determinant tells nothing; λ²(μ) itself is analytic and simple there.
+    """
+    low, high = event.old.mu, event.new.mu
+    size = max(abs(state.roots[event.index]) ** 2 for state in (event.old, event.new))
+
+    def square(mu: float) -> float:
+        state = Tracker.resumed(spectrum, event.old).advance(mu)
+        found = float((state.roots[event.index] ** 2).real)
+        return found if abs(found) > STANDS * size else 0.0  # nearer to zero it is rounding
+
+    try:
+        ends = square(low), square(high)
+        if ends[0] * ends[1] > 0.0:
+            return None
+        mu = float(brentq(square, low, high, xtol=1e-15, rtol=1e-15))
+        beside = max(low, mu - ASIDE * (high - low)), min(high, mu + ASIDE * (high - low))
+        opens = (square(beside[1]) - square(beside[0])) / (beside[1] - beside[0])
+    except AnalysisError:
+        return None
+    # It ends in such a motion, with no force in any contact.
+    free = fixed_vectors(spectrum)[:, int(np.argmin(np.abs(spectrum.fixed)))]
+    x = np.concatenate([free, np.zeros(family.size - len(free))]).astype(complex)
+    return Root(mu, 0j, x, None, opens, family.backward_error(mu, 0j, x), x)
 
 
 def _concerned(event: _Event) -> tuple[int, ...]:
@@ -299,7 +331,7 @@ def _located(
 ) -> Onset | None:
     """The onset inside an enclosed passage; where Newton strays, the passage is enclosed more closely."""
     for _ in range(NARROWINGS):
-        onset = _solve(family, judge, event, order, has_damping)
+        onset = _solve(spectrum, family, judge, event, order, has_damping)
         if onset is not None:
             reach = 0.5 * (event.new.mu - event.old.mu) + 1e-9
             near = event.old.mu - reach <= onset.mu <= event.new.mu + reach
@@ -335,8 +367,9 @@ def _narrowed(spectrum: ReceptanceProblem, event: _Event, has_damping: bool) -> 
 
 
 def _solve(
-    family: Family, judge: BackwardError, event: _Event, order: dict[int, int], has_damping: bool
-) -> Onset | None:
+    spectrum: ReceptanceProblem, family: Family, judge: BackwardError, event: _Event, order: dict[int, int],
+    has_damping: bool,
+) -> Onset | None:  # fmt: skip
     """Newton on the assembled matrices from an enclosed passage; None where it was no passage."""
     partner = order[event.partner] if event.partner >= 0 else order[event.branch]
     branches = (min(order[event.branch], partner), max(order[event.branch], partner))
@@ -349,7 +382,10 @@ def _solve(
     root: Root | None = None
     root_coefficient: float | None = None
     exceptional_mu: complex | None = None
-    if still and (vectors := null_vectors(family.at(mu), 0j)):
+    free = bool(np.any(np.abs(spectrum.fixed) <= STILL * abs(event.old.roots[event.index])))
+    if event.double and still and free:
+        root = _vanishing(spectrum, family, event)
+    elif still and (vectors := null_vectors(family.at(mu), 0j)):
         root = standstill(family, mu, *vectors, between)
     if root is None and not (event.double and still) and (vectors := null_vectors(family.at(mu), lam)):
         if event.double:
@@ -365,7 +401,9 @@ def _solve(
     if root.square is not None:
         root_coefficient = float(np.sqrt(abs(root.square)))
     shape = root.vector[: family.freedoms]
-    residual = float(judge(np.array([root.lam]), (shape / np.linalg.norm(shape))[:, None], root.mu)[0])
+    residual = root.residual  # where no contact has a force, what displacements make of it is rounding
+    if root.lam or not free:
+        residual = float(judge(np.array([root.lam]), (shape / np.linalg.norm(shape))[:, None], root.mu)[0])
     return Onset(
         mu=0.0 if event.mu == 0.0 and abs(root.mu) <= OPENS * OPENS else root.mu,
         frequency_hz=abs(root.lam.imag) / (2 * np.pi),

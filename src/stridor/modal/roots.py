@@ -14,10 +14,12 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg as sl
 
+from ..errors import AnalysisError, FollowingError
 from ..system.uncoupled import UncoupledModes
 from ..typing import Array, BoolArray, ComplexArray, IntArray
 from .coupling import PointCoupling
 from .deflation import deflation
+from .painleve import undetermined
 from .receptance import Receptance, wanted_pairs
 from .shift_inverted import companion
 from .single_contact import NUDGE, SingleContact, polish_single
@@ -367,9 +369,15 @@ def dense_roots(spectrum: ReceptanceProblem, mu: float, limit: float) -> Complex
     damping = damping + (tangent.T * coupling.friction_damping(mu)) @ tangent
     if rigid.any():
         right, left = sl.null_space(normal[rigid]), sl.null_space(push[rigid])
+        if right.shape != left.shape:
+            raise AnalysisError(undetermined(mu))
         mass, damping, stiffness = (left.T @ a @ right for a in (mass, damping, stiffness))
     shift = limit / 13
-    theta = sl.eigvals(companion(mass, damping, stiffness, shift)[0])
+    matrix = companion(mass, damping, stiffness, shift)[0] if shift > 0.0 else np.full((1, 1), np.nan)
+    if not np.all(np.isfinite(matrix)):
+        # Two or more zero roots beside what merges with them: nothing is left to invert.
+        raise FollowingError(f"branches cannot be told apart near μ = {mu:.9g}: several roots are zero there")
+    theta = sl.eigvals(matrix)
     theta = theta[np.abs(theta) > shift / (3 * limit)]
     values = shift * (1.0 + 1.0 / theta)
     values = np.where(np.abs(values.imag) < 1e-9 * np.abs(values), values.real + 0j, values)

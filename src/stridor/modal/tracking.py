@@ -24,6 +24,7 @@ from .roots import ReceptanceProblem, dense_roots, frictionless_roots, polish
 CLOSE = 0.25  # a correction may be this fraction of the distance to the next root
 CONTINUATION_STEPS = 12
 MOST_LEAPS = 40
+LEAST_REACH = 0.1  # of the fastest root of the start: those up to there are found anew at least
 START_OF_SLOPES = 1e-6  # μ at which tracking starts where friction has a slope
 
 
@@ -96,7 +97,8 @@ class Tracker:
         while self.state.mu < mu:
             step = min(self._step, mu - self.state.mu)
             taken = self._try(self.state.mu + step if step < mu - self.state.mu else mu)
-            if taken is None:
+            # From a double root no tangent leads on: what is asked for there is given, and others are stepped over.
+            if taken is None or (taken.mu < mu and not np.all(np.isfinite(taken.tangents))):
                 self._step = step / 4
                 if self._step >= self.smallest_step:
                     continue
@@ -115,14 +117,15 @@ class Tracker:
         Which of the merging branches is which beyond that place is a convention; that none is lost is not.
         """
         old = self.state
-        reach = 1.5 * float(np.abs(old.roots).max())
+        # All may stand at zero, where nothing says what to invert about.
+        reach = max(1.5 * float(np.abs(old.roots).max()), LEAST_REACH * float(np.abs(self.origin).max()))
         upper, lower = np.flatnonzero(old.roots.imag >= 0), np.flatnonzero(old.roots.imag < 0)
         # Roots of the lower half plane are explicit twins of upper ones.
         twin_of = np.array(
             [upper[np.argmin(np.abs(old.roots[upper] - np.conj(old.roots[j])))] for j in lower],
             dtype=np.int64,
         )
-        for leap in (1e-8, 1e-7, 1e-6, 1e-5, 1e-4) if self._leaps <= MOST_LEAPS else ():
+        for leap in (1e-8, 1e-7, 1e-6, 1e-5, 1e-4) if self._leaps <= MOST_LEAPS and reach > 0.0 else ():
             mu = min(old.mu + leap, end)
             found = dense_roots(self.spectrum, mu, reach)
             found = found[found.imag >= 0]
@@ -156,9 +159,9 @@ class Tracker:
     def _try(self, mu: float) -> RootState | None:
         old = self.state
         step = mu - old.mu
-        predicted = old.roots + step * old.tangents
-        if not np.all(np.isfinite(predicted)):
+        if not np.all(np.isfinite(old.tangents)):
             return None
+        predicted = old.roots + step * old.tangents
         implied = old.implied.copy()
         twins: list[complex] = []
         origins: list[int] = []

@@ -7,6 +7,7 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 
 from ..contact.nodes import ContactNodes
+from ..errors import AnalysisError
 from ..system import System
 from ..system.holders import words
 from ..typing import Array, BoolArray, IntArray, Sparse
@@ -48,6 +49,14 @@ def redundant(system: System, nodes: ContactNodes, rigid: BoolArray) -> str:
         f"contact {'follows' if more == 1 else 'follow'} from the others ({who}), so that their forces cannot be told "
         "apart; give one of these contacts a stiffness, or remove it or a support"
     )
+
+
+def refuse_redundant(system: System) -> None:
+    """Raise AnalysisError for rigid contacts whose rows of normal displacement are dependent, where all touch: without
+    a load there is no steady sliding that would say so."""
+    nodes = system.contact_nodes()
+    if twice := system.once(("redundant",), lambda: redundant(system, nodes, nodes.compliance == 0.0)):
+        raise AnalysisError(twice)
 
 
 def nearly_one(system: System, touches: BoolArray, rigid: BoolArray) -> str:

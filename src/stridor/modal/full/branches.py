@@ -16,6 +16,7 @@ import numpy as np
 from ...typing import ComplexArray
 from ..at_rest import moving
 from ..dense_problem import eigenvalues
+from ..histories import crossings
 from ..krylov.exceptional import exceptional_point
 from ..krylov.follow import BranchState
 from ..krylov.passages import Passage
@@ -35,6 +36,7 @@ from .passages import located, quiet
 ALIKE = 1e-8  # of |λ|: eigenvalues that are one
 SAME = 1e-5  # of the highest frequency: a mode of the low end as it is found twice, on a basis and in the full problem
 OPENING = 1e-6  # of the range: passages that close to where growth opens are that
+BORDERS = 1e-6  # of the band: modes so near its end may count on either side
 CLEARLY = 1.02  # times the band: passages beyond it are counted and not solved
 
 
@@ -116,35 +118,36 @@ def solved(
             one = replace(one, onset=replace(one.onset, enters_at=entry))
         if not any(_same(one.onset, other.onset, family) for other in found):
             found.append(one)
-    found = without_crossings(found)
+    crossed = crossings([f.onset for f in found])
+    found = [f for k, f in enumerate(found) if k not in crossed]
     inside = (f.onset for f in found if between[0] <= f.onset.mu <= between[1])
-    balance += sum(o.roots for o in inside)
+    said = sum(o.roots for o in inside)
+    balance += said
     explained = _explained(lost)
     growing = [growing_roots(state.values[unstable(family, state.values, top)]) for state in (way.low, way.high)]
     fast = _throughout(family, (way.low, way.high), ends, top)
     agree = all(
         _agree(family, state, end, top, fast) for state, end in zip((way.low, way.high), ends, strict=True)
     )
+    agree = agree and _across_known(family, way, ends, top, said)
     return found, way, agree and explained and growing[1] - growing[0] == balance
 
 
-def without_crossings(found: list[BranchOnset]) -> list[BranchOnset]:
-    """Without undamped modes that cross: rounding makes them meet and part again at one place, and grow in between by
-    no more than rounding, κ√Δμ at most."""
-    crossings: set[int] = set()
-    for k, one in enumerate(found):
-        for m, other in enumerate(found):
-            begins, ends = one.onset, other.onset
-            if begins.stabilising or not ends.stabilising or begins.branches != ends.branches:
-                continue
-            opens, closes = begins.square_root_coefficient, ends.square_root_coefficient
-            if m in crossings or opens is None or closes is None:
-                continue
-            grows = max(opens, closes) * np.sqrt(max(ends.mu - begins.mu, 0.0))
-            if ends.mu >= begins.mu and grows <= SPLIT_RELATIVE * 2 * np.pi * begins.frequency_hz:
-                crossings |= {k, m}
-                break
-    return [one for k, one in enumerate(found) if k not in crossings]
+def _across_known(
+    family: Family, way: Followed, ends: tuple[RegionModes, RegionModes], top: float, said: int
+) -> bool:  # fmt: skip
+    """Whether roots that grow in the band at one end and not at the other, beside the ``said`` of the onsets, may have
+    passed its border: something grows beyond it then at an end, or begins or ceases to."""
+    counts = [growing_roots(end.values[unstable(family, end.values, top)]) for end in ends]
+    if counts[1] - counts[0] == said:
+        return True
+    border = (1 - BORDERS) * top
+    beyond = any(
+        np.any(state.values[unstable(family, state.values, top)].imag > border)
+        or np.any(np.abs(end.values[unstable(family, end.values, top)]) > border)
+        for state, end in zip((way.low, way.high), ends, strict=True)
+    )
+    return bool(beyond) or any(_is_above(passage, border) for passage in way.passages)
 
 
 def _concerned(passage: Passage) -> tuple[int, ...]:

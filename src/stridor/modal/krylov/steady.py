@@ -17,6 +17,7 @@ from ...sliding import (
     friction_damping_matrix,
     full_motion,
     least_force,
+    refuse_redundant,
     require_pressed,
     steady_nodes,
     steady_sliding,
@@ -127,6 +128,7 @@ def touching_nodes(system: System, nodes: ContactNodes, mu: float | None, solver
             f"equilibrium at {'their own friction' if mu is None else f'μ = {mu:g}'} has them"
         )
         return TouchingNodes(steady.active, steady.sense, stuck, still > 0, words, steady.normal_force)
+    refuse_redundant(system)
     slip = nodes.slip_velocity(full_motion(system))
     speed = np.linalg.norm(slip, axis=1)
     slides = speed > STILL * float(speed.max(initial=0.0))
