@@ -21,13 +21,13 @@ from .full.family import Family
 from .histories import Entries, StabilityChange, imbalance, once_each, reported, unexplained
 from .meeting import partner_of
 from .newton import Root, crossing, exceptional, meeting, standstill
-from .onset import Branches, Onset, Onsets
+from .onset import AT_ONSET, Branches, Onset, Onsets
 from .options import Options
 from .quadratic.inverse_iteration import null_vectors
 from .receptance_modes import in_order, prepare, unfit_words
 from .results import grows
 from .roots import ReceptanceProblem
-from .tolerances import BELIEVED, UNSTABLE_RELATIVE
+from .tolerances import BELIEVED, SPLIT_RELATIVE, UNSTABLE_RELATIVE
 from .tracking import RootState, Tracker
 from .unfit import Unfit
 
@@ -101,7 +101,7 @@ def onsets_by_receptance(
     ]
     changes = [change for change, _ in passed]
     return Onsets(
-        tuple(reported(changes, entries, (low, high), max_frequency_hz)),
+        tuple(reported(changes, entries, (low, high), max_frequency_hz, _begun(start, has_damping))),
         (low, high),
         max_frequency_hz,
         has_damping,
@@ -111,10 +111,11 @@ def onsets_by_receptance(
         unexplained=unexplained(
             end.branch[_inside(end.roots, top)].tolist(),
             start.branch[_inside(start.roots, np.inf)].tolist(),
-            [c for c in changes if c.onset is not None and c.onset.mu >= low],
+            [c for c in changes if c.onset is not None and c.onset.mu >= low - AT_ONSET * high],
         ),
         unbalanced=_unbalanced([(c, events[k]) for c, k in passed if k >= before], start, end, top),
         followed=(_numbered(start, spectrum, order, top), _numbered(end, spectrum, order, top)),
+        at_top=tuple(p for p in entries.passed if p.low >= low),
     )
 
 
@@ -147,6 +148,12 @@ def _numbered(state: RootState, spectrum: ReceptanceProblem, order: dict[int, in
     fixed = sorted(set(range(1, len(order) + len(spectrum.fixed) + 1)) - set(order.values()))
     unseen = spectrum.fixed[in_order(spectrum.fixed, top)]
     return np.array(numbers + fixed, dtype=np.int64), np.concatenate([state.roots[known], unseen])
+
+
+def _begun(state: RootState, has_damping: bool) -> set[int]:
+    """The branches that surely grow at one μ: beside a meeting the root of what is rounding may be growth."""
+    rounding = UNSTABLE_RELATIVE if has_damping else SPLIT_RELATIVE
+    return set(state.branch[state.roots.real > rounding * np.abs(state.roots)].tolist())
 
 
 def _inside(roots: ComplexArray, top: float) -> BoolArray:
