@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from test_between_the_ends import random_system
 
 import stridor as st
 from stridor.modal.between_ends import Between
@@ -17,6 +18,8 @@ from stridor.modal.checked_onsets import checked_onsets
 from stridor.modal.histories import Entries
 from stridor.modal.onset import Onset, Onsets
 from stridor.modal.onsets import onsets
+from stridor.modal.options import Options
+from stridor.modal.over_friction import onsets_of_band
 from stridor.system import System
 
 pytestmark = pytest.mark.verification
@@ -53,6 +56,19 @@ def test_growth_that_begins_at_the_low_end_is_listed(block: System, source: str)
 def test_growth_that_began_below_the_low_end_is_not(block: System, beyond: float) -> None:
     told = found(block, MEETS + beyond, 1.0)
     assert (len(told), len(told.at_start), len(told.at_end), told.complete) == (0, 1, 1, True)
+
+
+@pytest.mark.parametrize(("seed", "ends"), [(103, False), (106, False), (114, False), (117, False), (79, True)])
+@pytest.mark.parametrize("beyond", [0.0, 1e-16, 1e-10])
+def test_damped_growth_that_begins_or_ends_at_the_low_end(seed: int, ends: bool, beyond: float) -> None:
+    system, _, band_hz = random_system(seed)
+    options = Options(source="receptance")
+    mu = next(o.mu for o in onsets_of_band(system, (0.0, 1.0), 2 * band_hz, options=options) if o.stabilising is ends)
+    low = mu * (1 + beyond)
+    told = onsets_of_band(system, (low, 1.0), 2 * band_hz, options=options)
+    assert (told.complete, told.unbalanced) == (True, 0), told.completeness
+    if not ends:
+        assert (told[0].stabilising, told[0].mu, len(told.at_start)) == (False, pytest.approx(low, rel=1e-12), 0)
 
 
 @pytest.mark.parametrize("high", [MEETS, float(np.nextafter(MEETS, 1.0))])
@@ -100,7 +116,7 @@ def test_nor_are_those_that_account_for_it_at_no_value_between() -> None:
 def test_who_passes_the_end_of_the_band_growing_is_counted() -> None:
     up, down = np.array([0.1 + 0.9j]), np.array([0.1 + 1.1j])
     begins = np.array([-0.1 + 0.9j])
-    each = ((up, down, [(2, 2)]), (down, up, [(-2, -2)]), (begins, down, [(0, 2)]), (begins, down - 0.2, []))
+    each = ((up, down, [(2, 2)]), (down, up, [(-2, -2)]), (begins, down, [(0, 2)]), (begins, down - 0.2, []), (0 * up, 1.1j * up / up, []))
     for old, new, counts in each:
         entries = Entries(1.0)
         entries.watch((0.2, 0.3), old, new, [1])

@@ -122,7 +122,9 @@ def _as_said(found: Onsets, start: Growing, mu: float, roots: int, more: int = 0
         ]
         said = growing_roots(start.values) + inside
         least, most = said - sum(up for _, up in over), said - sum(low for low, _ in over)
-    return least <= roots <= most + more
+    # Rounding decides whether what begins or ends at the low end itself grows there.
+    there = [o.roots for o in found.onsets if abs(o.mu - found.friction_range[0]) <= AT_ONSET * found.friction_range[1]]
+    return least - sum(r for r in there if r > 0) <= roots <= most + more - sum(r for r in there if r < 0)
 
 
 def _at_onset(found: Onsets, mu: float) -> bool:

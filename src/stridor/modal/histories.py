@@ -44,7 +44,7 @@ class Entries:
             part = float((old.imag[i] - self.top) / (old.imag[i] - new.imag[i]))
             self.found.setdefault(int(branch[i]), []).append((between[0] + part * step, step))
         for i in np.flatnonzero((old.imag > self.top) != (new.imag > self.top)).tolist():
-            growth = [float(v.real) / abs(v) for v in (old[i], new[i])]
+            growth = [float(v.real) / max(abs(v), 1e-300) for v in (old[i], new[i])]
             if max(growth) <= UNSTABLE_RELATIVE:
                 continue
             least = 2 if min(growth) > SPLIT_RELATIVE else 0

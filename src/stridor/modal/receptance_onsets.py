@@ -101,7 +101,7 @@ def onsets_by_receptance(
     ]
     changes = [change for change, _ in passed]
     return Onsets(
-        tuple(reported(changes, entries, (low, high), max_frequency_hz, _begun(start, has_damping))),
+        tuple(reported(changes, entries, (low, high), max_frequency_hz, _begun(start, has_damping, top))),
         (low, high),
         max_frequency_hz,
         has_damping,
@@ -113,7 +113,9 @@ def onsets_by_receptance(
             start.branch[_inside(start.roots, np.inf)].tolist(),
             [c for c in changes if c.onset is not None and c.onset.mu >= low - AT_ONSET * high],
         ),
-        unbalanced=_unbalanced([(c, events[k]) for c, k in passed if k >= before], start, end, top),
+        unbalanced=_unbalanced(
+            [(c, events[k]) for c, k in passed if k >= before or _at_low(c, start, (low, high))], start, end, top
+        ),
         followed=(_numbered(start, spectrum, order, top), _numbered(end, spectrum, order, top)),
         at_top=tuple(p for p in entries.passed if p.low >= low),
     )
@@ -150,10 +152,20 @@ def _numbered(state: RootState, spectrum: ReceptanceProblem, order: dict[int, in
     return np.array(numbers + fixed, dtype=np.int64), np.concatenate([state.roots[known], unseen])
 
 
-def _begun(state: RootState, has_damping: bool) -> set[int]:
-    """The branches that surely grow at one μ: beside a meeting the root of what is rounding may be growth."""
+def _at_low(change: StabilityChange, start: RootState, between: tuple[float, float]) -> bool:
+    """Whether growth begins at the low end itself, which rounding has put behind it, and does not count there."""
+    onset, (low, high) = change.onset, between
+    if onset is None or onset.stabilising or onset.mu < low - AT_ONSET * high:
+        return False
+    return not set(change.branches) & set(start.branch[grows(start.roots, 0.0)].tolist())
+
+
+def _begun(state: RootState, has_damping: bool, top: float) -> set[int]:
+    """The branches that surely grow at one μ: beside a meeting the root of what is rounding may be growth. What
+    diverges has no frequency to be held against but the band's, top [1/s]."""
     rounding = UNSTABLE_RELATIVE if has_damping else SPLIT_RELATIVE
-    return set(state.branch[state.roots.real > rounding * np.abs(state.roots)].tolist())
+    scale = np.where(state.roots.imag == 0.0, top, np.abs(state.roots))
+    return set(state.branch[state.roots.real > rounding * scale].tolist())
 
 
 def _inside(roots: ComplexArray, top: float) -> BoolArray:
