@@ -96,8 +96,7 @@ def onsets_by_receptance(
     judge, family = BackwardError(coupling), _PointFamily(coupling, (0.0, high))
     passed = [
         (StabilityChange(event.mu, _concerned(event), _located(spectrum, family, judge, event, order, has_damping)), k)
-        for k, event in enumerate(events)
-        if event.mu > 0.0 or event.branch in grown  # growth that stays within rounding all over the range is none
+        for k, event in _beyond_rounding(events, grown)
     ]
     changes = [change for change, _ in passed]
     return Onsets(
@@ -119,6 +118,21 @@ def onsets_by_receptance(
         followed=(_numbered(start, spectrum, order, top), _numbered(end, spectrum, order, top)),
         at_top=tuple(p for p in entries.passed if p.low >= low),
     )
+
+
+def _beyond_rounding(events: list[_Event], grown: set[int]) -> list[tuple[int, _Event]]:
+    """The passages, each with its place, without growth that begins with friction itself and stays within rounding all
+    over the range, and without where that ends. grown: the branches seen to grow beyond it."""
+    kept: list[tuple[int, _Event]] = []
+    faint: set[int] = set()
+    for k, event in enumerate(events):
+        if event.mu == 0.0 and event.branch not in grown:
+            faint.add(event.branch)
+        elif event.stabilising and event.branch in faint:
+            faint.remove(event.branch)
+        else:
+            kept.append((k, event))
+    return kept
 
 
 class _PointFamily(Family):
