@@ -17,14 +17,14 @@ from .complex_modes import complex_modes
 from .full.growth import growing_roots
 from .growing import Growing, growing_modes, missing
 from .krylov.problem import ContactProblem, problem_of
-from .onset import Onsets
+from .onset import AT_ONSET, Onsets
 from .options import Options
 from .quadratic.dense import all_modes
 from .tolerances import SPLIT_RELATIVE, UNSTABLE_RELATIVE
 
 SMALL = 40  # freedoms up to which a few μ between the ends are looked at
 INTERVALS = 12
-AT_ONSET = 1e-9  # of the highest μ: an onset no further from a value is at it, and rounding decides what grows there
+DOUBLE = 1e-8  # of λ: modes no further from one another are one
 MARGIN = 1.01  # times the highest frequency: every branch
 
 
@@ -44,8 +44,15 @@ class Between:
             return ""
         if not self.odd:
             return f" As many roots grow at each of {self.looked} further values as the onsets say."
-        where = f"At {self.odd} of {self.looked} further values" if self.odd < self.looked else "At all further values"
+        where = f"At {self.odd} of {self.looked} further values"
         return f" {where} other numbers of roots grow than the onsets say, and branches lead to each of these."
+
+    @property
+    def amiss(self) -> list[str]:
+        """What is wrong where the onsets account for what grows at no value that was looked at."""
+        if not self.looked or self.odd < self.looked:
+            return []
+        return [f"at all {self.looked} values looked at between them other numbers of roots grow than the onsets say"]
 
 
 NOT_LOOKED = Between(0)
@@ -62,12 +69,12 @@ def between_ends(
     inner = [mu for mu in np.linspace(low, high, INTERVALS + 1)[1:-1].tolist() if not _at_onset(found, mu)]
     try:
         problem = problem_of(system if damped else system.undamped(), None, options)
-        differ = [mu for mu in inner if _growing_roots(problem, mu, start) != _said(found, start, mu)]
+        differ = [mu for mu in inner if not _as_said(found, start, mu, _growing_roots(problem, mu, start))]
         seen = (
             growing_modes(system, mu, found.max_frequency_hz, touching_at=None, damped=damped, options=options)
             for mu in differ
         )
-        odd = [g for g in seen if growing_roots(g.values) != _said(found, start, g.mu)]
+        odd = [g for g in seen if not _as_said(found, start, g.mu, growing_roots(g.values), twice(g.values))]
         if not odd:
             return Between(len(inner))
         # The high end beside them: of one μ alone those nodes would touch that do so there.
@@ -93,10 +100,31 @@ def every_branch(system: System, found: Onsets, *, damped: bool, options: Option
     return MARGIN * float(np.abs(values).max(initial=0.0)) / (2 * np.pi * found.max_frequency_hz)
 
 
-def _said(found: Onsets, start: Growing, mu: float) -> int:
-    """How many eigenvalues grow in the band at μ by what grows at the low end and the onsets below it."""
-    passed = [o.roots for o in found.onsets if (o.mu if o.enters_at is None else o.enters_at) < mu]
-    return growing_roots(start.values) + sum(passed) + 2 * sum(at < mu for _, at in found.entering)
+def twice(values: ComplexArray) -> int:
+    """How many roots of growing modes (k,) are of others once more: an onset of modes that are one is listed once."""
+    ordered = values[np.lexsort((values.real, values.imag))]
+    same = np.abs(np.diff(ordered)) <= DOUBLE * np.abs(ordered[1:])
+    return growing_roots(ordered[1:][same])
+
+
+def _as_said(found: Onsets, start: Growing, mu: float, roots: int, more: int = 0) -> bool:
+    """Whether as many roots grow in the band at μ as what grows at the low end, the onsets below it and the branches
+    that have passed the end of the band say, or up to ``more`` beyond that."""
+    if found.at_top is None:
+        passed = [o.roots for o in found.onsets if (o.mu if o.enters_at is None else o.enters_at) < mu]
+        least = most = growing_roots(start.values) + sum(passed) + 2 * sum(at < mu for _, at in found.entering)
+    else:
+        inside = sum(o.roots for o in found.onsets if o.enters_at is None and o.mu < mu)
+        over = [
+            (p.least, p.most) if p.high <= mu else (min(p.least, 0), max(p.most, 0))
+            for p in found.at_top
+            if p.low < mu
+        ]
+        said = growing_roots(start.values) + inside
+        least, most = said - sum(up for _, up in over), said - sum(low for low, _ in over)
+    # Rounding decides whether what begins or ends at the low end itself grows there.
+    there = [o.roots for o in found.onsets if abs(o.mu - found.friction_range[0]) <= AT_ONSET * found.friction_range[1]]
+    return least - sum(r for r in there if r > 0) <= roots <= most + more - sum(r for r in there if r < 0)
 
 
 def _at_onset(found: Onsets, mu: float) -> bool:

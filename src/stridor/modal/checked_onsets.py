@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -12,18 +12,19 @@ from ..digits import hertz
 from ..errors import AnalysisError
 from ..system import System
 from ..typing import ComplexArray, IntArray
-from .between_ends import Between, between_ends, every_branch
+from .between_ends import DOUBLE, Between, between_ends, every_branch, twice
 from .full.growth import growing_roots
 from .growing import CHECKED, UNCHECKED, WIDER, Growing, affordable, growing_modes, missing, too_large, unconfirmed
 from .joined import matched
 from .krylov import Carried
-from .onset import NOT_COMPLETE
+from .onset import AT_ONSET, NOT_COMPLETE, Onset
 from .onsets import FOLLOW, Onsets, onsets
 from .options import Options
 from .results import grows
+from .tolerances import SPLIT_RELATIVE, UNSTABLE_RELATIVE
 
 MOST = 4  # that are named
-DOUBLE = 1e-8  # of λ: modes no further from one another are one
+UNSURE = 2.0  # times the growth that counts
 
 
 def checked_onsets(
@@ -146,7 +147,7 @@ def _sentence(found: Onsets, start: Growing, end: Growing, between: Between) -> 
             f"the onsets begin and end the growth of {abs(found.unbalanced)} "
             f"{'more' if found.unbalanced > 0 else 'fewer'} eigenvalues than the branches followed have at both ends"
         )
-    wrong += _roots_amiss(found, start, end)
+    wrong += _roots_amiss(found, start, end) or between.amiss
     wrong += _ends_before(found, start)
     if wrong:
         return f"{NOT_COMPLETE}: {numbers}, but {'; '.join(wrong)}. {_advice(start, high)}"
@@ -155,7 +156,8 @@ def _sentence(found: Onsets, start: Growing, end: Growing, between: Between) -> 
         return f"{NOT_COMPLETE}: {numbers}, as the onsets say, but {sentence}"
     return (
         f"{CHECKED} {'both ends' if start.sought else 'the high end'}: {numbers}, and each of them goes back to an "
-        f"onset listed or grew from the start.{_left_words(found, start, end)}{_parted_words(found, start, end)} "
+        f"onset listed or grew from the start.{_left_words(found, start, end)}"
+        f"{_last_words(found, start, end)}{_parted_words(found, start, end)} "
         f"{end.sentence} What grows and ends again between them rests on the branches followed.{between.words}"
     )
 
@@ -179,6 +181,69 @@ def _unled_words(values: ComplexArray, mu: float) -> str:
     return f"no branch was seen to lead to {named} at μ = {mu:g}"
 
 
+@dataclass(frozen=True)
+class _Account:
+    """What the roots that onsets begin and end, from what grows at the low end on, say more than grow at the high end,
+    and what becomes of these: modes that have ``passed`` the end of the band upwards growing, less those that come
+    down; ``opening``, whose growth begins at the high end itself; ``ceasing``, whose growth ends there.
+    ``amiss``: roots that nothing accounts for."""
+
+    passed: int = 0
+    opening: int = 0
+    ceasing: int = 0
+    amiss: int = 0
+
+
+def _account(found: Onsets, start: Growing, end: Growing) -> _Account:
+    """With n⁻ and n⁺ growing roots of the band at both ends, r of each onset in it, and t of each branch that passes
+    its end upwards: n⁺ = n⁻ + Σ r − Σ t. What is at an end of the range, or at the end of the band, counts or not."""
+    if found.at_top is None or found.followed is None:
+        return _Account()
+    low, high = found.friction_range
+    listed = [o for o in found.onsets if o.enters_at is None]
+    slow, before = (_slow(f[1], g) for f, g in zip(reversed(found.followed), (end, start), strict=True))
+    more = sum(o.roots for o in listed) + growing_roots(start.values) - growing_roots(end.values)
+    more -= growing_roots(slow) - growing_roots(before)
+    over = min(max(more, sum(p.least for p in found.at_top)), sum(p.most for p in found.at_top))
+    rest = more - over
+    near = AT_ONSET * high
+    last = [o.roots for o in listed if high - o.mu <= near]
+    first = [o.roots for o in listed if o.mu - low <= near]
+    opening = min(max(rest, 0), sum(r for r in last if r > 0))
+    rest -= opening
+    ceasing = min(max(rest, 0), 2 * _standing(found, end))
+    rest -= ceasing
+    # Of the ends themselves and of modes that are one.
+    least = sum(r for r in (*last, *first) if r < 0) - twice(end.values)
+    most = sum(r for r in first if r > 0) + twice(start.values)
+    border = [2 for values in (found.followed[0][1], found.followed[1][1]) for _ in range(_on_border(values, end.top))]
+    return _Account(over, opening, ceasing, rest - min(max(rest, least - sum(border)), most + sum(border)))
+
+
+def _standing(found: Onsets, end: Growing) -> int:
+    """How many branches have grown and are on the axis at the high end, but for rounding."""
+    if found.followed is None:
+        return 0
+    (before, began), (numbers, values) = found.followed
+    grew = set(before[grows(began, 0.0)].tolist())
+    rounding = UNSURE * UNSTABLE_RELATIVE if found.damped else SPLIT_RELATIVE
+    still = (np.abs(values.real) <= rounding * np.abs(values)) & (values.imag > 0) & (values.imag <= end.top)
+    last = _last(found)
+    have = [b for b in numbers[still].tolist() if (not last[b].stabilising if b in last else b in grew)]
+    # Of two that meet one grows.
+    return len({last[b].branches if b in last and last[b].growth_slope is None else b for b in have})
+
+
+def _last(found: Onsets) -> dict[int, Onset]:
+    """The last onset of each branch."""
+    return {b: o for o in found.onsets for b in o.branches}
+
+
+def _on_border(values: ComplexArray, top: float) -> int:
+    """How many growing branches are where the band ends, but for rounding."""
+    return int(np.count_nonzero(grows(values, 0.0) & (np.abs(values.imag - top) <= AT_ONSET * top)))
+
+
 def _left_words(found: Onsets, start: Growing, end: Growing) -> str:
     """Sentences on modes that begin to grow at an onset listed and by the high end have left the band upwards, or are
     too slow to be sought there."""
@@ -186,12 +251,10 @@ def _left_words(found: Onsets, start: Growing, end: Growing) -> str:
         return ""
     limit, (numbers, values) = found.max_frequency_hz, found.followed[1]
     beyond = grows(values, 0.0) & (values.imag > 2 * np.pi * limit)
-    last = {b: o for o in found.onsets for b in o.branches}
+    last = _last(found)
     on = sum(b in last and not last[b].stabilising for b in numbers[beyond].tolist())
-    said = sum(o.roots for o in found.onsets) + 2 * len(found.entering)
-    slow, before = (_slow(f[1], g) for f, g in zip(reversed(found.followed), (end, start), strict=True))
-    unsought = growing_roots(slow) - growing_roots(before)
-    ended = max((said - growing_roots(end.values) + growing_roots(start.values) - unsought) // 2 - on, 0)
+    came = sum(o.enters_at is not None for o in found.onsets) + len(found.entering)
+    ended = max(_account(found, start, end).passed // 2 + came - on, 0) if found.at_top else 0
     told: list[str] = []
     if on:
         verb, they = ("has", "it grows") if on == 1 else ("have", "they grow")
@@ -200,11 +263,25 @@ def _left_words(found: Onsets, start: Growing, end: Growing) -> str:
     if ended:
         told.append(f"{ended} {'has' if ended == 1 else 'have'} left the band upwards and ceased to grow beyond it")
     left = f" Of the growing modes {', and '.join(told)}." if told else ""
+    slow = _slow(values, end)
     if not len(slow):
         return left
     below = f"below {end.still / (2 * np.pi):.3g} Hz, where none was sought beside motions as a whole"
     counted = "1 branch grows" if len(slow) == 1 else f"{len(slow)} branches grow"
     return f"{left} At μ = {found.friction_range[1]:g}, {counted} {below}."
+
+
+def _last_words(found: Onsets, start: Growing, end: Growing) -> str:
+    """A sentence on growth that begins or ends where the range does, and does not count there."""
+    account, high = _account(found, start, end), found.friction_range[1]
+    at = f"at μ = {high:g}, the end of the range"
+    told: list[str] = []
+    if account.opening:
+        told.append(f"Growth begins {at}: nothing of it is beyond rounding there.")
+    if account.ceasing:
+        modes = (account.ceasing + 1) // 2
+        told.append(f"{modes} of the modes that grew {'is' if modes == 1 else 'are'} on the axis {at}.")
+    return "".join(f" {one}" for one in told)
 
 
 def _slow(values: ComplexArray, sought: Growing) -> ComplexArray:
@@ -213,17 +290,17 @@ def _slow(values: ComplexArray, sought: Growing) -> ComplexArray:
 
 
 def _roots_amiss(found: Onsets, start: Growing, end: Growing) -> list[str]:
-    """What onsets and the growing eigenvalues at both ends say otherwise where motions grow without oscillating: a pair
-    that has fallen apart on the real axis is two of them, and one may go through zero unseen by any branch."""
-    if np.all(start.values.imag) and np.all(end.values.imag):
-        return []
+    """What onsets and the growing eigenvalues at both ends say otherwise. Where motions grow without oscillating no
+    branch need show it: a pair that has fallen apart on the real axis is two of them, and one may go through zero."""
     more, said = growing_roots(end.values) - growing_roots(start.values), sum(o.roots for o in found.onsets)
-    if more == said:
+    alone = not (np.all(start.values.imag) and np.all(end.values.imag))
+    if not _account(found, start, end).amiss if found.at_top is not None else not alone or more == said:
         return []
-    return [
-        f"{more:+d} eigenvalues grow from one to the other where the onsets say {said:+d}: a motion that does not "
-        "oscillate begins or ceases to grow, or a mode leaves the band"
-    ]
+    why = (
+        "a motion that does not oscillate begins or ceases to grow, or a mode leaves the band" if alone else
+        "growth begins or ends where no onset is listed, or a mode passes the end of the band unseen"
+    )  # fmt: skip
+    return [f"{more:+d} eigenvalues grow from one to the other where the onsets say {said:+d}: {why}"]
 
 
 def _ends_before(found: Onsets, start: Growing) -> list[str]:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
 
 from ..typing import ComplexArray, IntArray
-from .onset import Onset
-from .tolerances import SPLIT_RELATIVE
+from .onset import AT_ONSET, AtTop, Onset
+from .tolerances import SPLIT_RELATIVE, UNSTABLE_RELATIVE
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,13 @@ class StabilityChange:
 
 
 class Entries:
-    """Where branches come into the band from above its end at the angular frequency top [1/s]."""
+    """Where branches come into the band from above its end at the angular frequency top [1/s], and ``passed``: all that
+    pass it either way and may grow there."""
 
     def __init__(self, top: float) -> None:
         self.top = top
         self.found: dict[int, list[tuple[float, float]]] = {}
+        self.passed: list[AtTop] = []
 
     def watch(
         self, between: tuple[float, float], old: ComplexArray, new: ComplexArray, branch: Sequence[int] | IntArray
@@ -42,6 +44,13 @@ class Entries:
         for i in came.tolist():
             part = float((old.imag[i] - self.top) / (old.imag[i] - new.imag[i]))
             self.found.setdefault(int(branch[i]), []).append((between[0] + part * step, step))
+        for i in np.flatnonzero((old.imag > self.top) != (new.imag > self.top)).tolist():
+            growth = [float(v.real) / max(abs(v), 1e-300) for v in (old[i], new[i])]
+            if max(growth) <= UNSTABLE_RELATIVE:
+                continue
+            least = 2 if min(growth) > SPLIT_RELATIVE else 0
+            up = new[i].imag > self.top
+            self.passed.append(AtTop(*between, *((least, 2) if up else (-2, -least))))
 
     def after(self, branches: tuple[int, ...], mu: float, before: float) -> float | None:
         """The first μ in [mu, before] at which one of these branches comes into the band, to about a step."""
@@ -52,15 +61,24 @@ class Entries:
 
 
 def reported(
-    changes: Iterable[StabilityChange], entries: Entries, between: tuple[float, float], max_frequency_hz: float
-) -> list[Onset]:
-    """Onsets of the range in the band, and those above it that begin growth which comes into it; each once."""
+    changes: Iterable[StabilityChange], entries: Entries, between: tuple[float, float], max_frequency_hz: float,
+    growing: Container[int] = (),
+) -> list[Onset]:  # fmt: skip
+    """Onsets of the range in the band, and those above it that begin growth which comes into it; each once.
+
+    An onset that rounding puts just below the low end is at it where growth begins there: where none of its branches is
+    among the ``growing`` ones of the low end."""
     low, high = between
     every = list(changes)
     kept: list[Onset] = []
     for change in every:
         onset = change.onset
-        if onset is None or not low <= onset.mu <= high:
+        if onset is None:
+            continue
+        begins = not onset.stabilising and not any(b in growing for b in change.branches)
+        if begins and low - AT_ONSET * high <= onset.mu < low:
+            onset = replace(onset, mu=low)
+        if not low <= onset.mu <= high:
             continue
         if onset.frequency_hz > max_frequency_hz:
             if onset.stabilising:

@@ -15,7 +15,7 @@ from scipy.optimize import linear_sum_assignment
 
 from ..sliding.stretches import Stretch
 from ..typing import Array, ComplexArray, IntArray
-from .onset import Onset, Onsets
+from .onset import AT_ONSET, Onset, Onsets
 from .results import ComplexModes
 
 ALIKE = 0.1  # of |λ|: how far a mode may jump where a node opens or closes
@@ -139,12 +139,14 @@ def joined_onsets(
     border: Callable[[int], TouchingChange],
     residual: Callable[[Stretch, float, complex], float],
     returning: Sequence[tuple[int, complex]] = (),
+    asked: tuple[float, float] | None = None,
 ) -> Onsets:
     """One list of onsets from those of neighbouring stretches.
 
     border(k): both sides of the border behind parts[k]; residual(stretch, mu, λ): backward error of a mode that grows
     at a border with the nodes of a stretch. returning: number of the stretch before a border, and the λ there, of modes
-    that leave the band at the border, go on growing above it and come back: their growth does not end.
+    that leave the band at the border, go on growing above it and come back: their growth does not end. asked: the range
+    that was asked for, where it is another.
     """
     names = Names()
     every: list[Onset] = []
@@ -171,7 +173,7 @@ def joined_onsets(
         damped=any(found.damped for _, found in parts),
         source=" and ".join(sorted({found.source for _, found in parts})),
         open_contacts=tuple(n for n in first.open_contacts if all(n in f.open_contacts for _, f in parts)),
-        completeness=_told(parts),
+        completeness=_told(parts, asked or between),
     )
 
 
@@ -235,13 +237,23 @@ def _order(onset: Onset) -> tuple[float, float]:
     return onset.mu, onset.frequency_hz
 
 
-def _told(parts: Sequence[tuple[Stretch, Onsets]]) -> str:
-    """What was checked in each stretch; nothing where nothing was in any."""
+def _told(parts: Sequence[tuple[Stretch, Onsets]], asked: tuple[float, float]) -> str:
+    """What was checked in each stretch, and of which part of the range asked for; nothing where nothing was in any."""
     if not any(found.completeness for _, found in parts):
         return ""
     held = "with the nodes of its middle" if any(s.others for s, _ in parts) else "with the nodes that touch there"
     said = [(s, found.completeness or "Not checked.") for s, found in parts]
-    return f"{len(parts)} stretches of μ, each {held}. {' '.join(by_stretch(said))}"
+    lead = f"{len(parts)} stretches of μ, each {held}." if len(parts) > 1 else f"One stretch of μ, {held}."
+    if unsolved := _unsolved([s for s, _ in parts], asked):
+        lead = f"Nothing is said of {unsolved}, where nothing was solved. {lead}"
+    return f"{lead} {' '.join(by_stretch(said))}"
+
+
+def _unsolved(solid: Sequence[Stretch], asked: tuple[float, float]) -> str:
+    """The parts of the range asked for in which there is no stretch, "" where there are none."""
+    ends = [asked[0], *(mu for s in solid for mu in (s.low, s.high)), asked[1]]
+    gaps = [(a, b) for a, b in zip(ends[::2], ends[1::2], strict=True) if b - a > AT_ONSET * asked[1]]
+    return " and ".join(f"μ = {a:.6g} to {b:.6g}" for a, b in gaps)
 
 
 def by_stretch(told: Sequence[tuple[Stretch, str]]) -> list[str]:

@@ -14,6 +14,18 @@ from ..typing import ComplexArray, IntArray
 from .tables import onsets_dataset, onsets_rows
 
 Branches = tuple[IntArray, ComplexArray]
+AT_ONSET = 1e-9  # of the highest μ: an onset no further from a value is at it, and rounding decides what grows there
+
+
+@dataclass(frozen=True)
+class AtTop:
+    """A branch that passes the end of the band between two neighbouring μ, and by how many fewer eigenvalues that grow
+    the band has then, at least and at most: 2 where it goes up and grows, −2 where it comes down."""
+
+    low: float
+    high: float
+    least: int
+    most: int
 
 
 @dataclass(frozen=True, repr=False)
@@ -104,7 +116,8 @@ class Onsets(Tabular):
     to grow at the onsets, less those that cease to, than do of all branches followed. completeness: what speaks for
     there being no others, "" where nothing was checked. notes: what else is to be known. contact_state: where contacts
     may stick, how many nodes stick, slip and are open, and at which μ; it is held over the range. followed: numbers and
-    eigenvalues (b,) of the branches at both ends, where branches were followed; saved nowhere.
+    eigenvalues (b,) of the branches at both ends, where branches were followed; saved nowhere. at_top: branches that
+    pass the end of the band; None where none were watched there.
     source: where the eigenpairs come from, a name of `modal.source`. band_hz: the frequencies asked for (`between`),
     None for all, and ``outside``, how many onsets there are at others; what grows at both ends, and completeness, are
     of all up to max_frequency_hz.
@@ -126,6 +139,7 @@ class Onsets(Tabular):
     provenance: dict[str, Any] = field(default_factory=dict)
     source: str = ""
     followed: tuple[Branches, Branches] | None = field(default=None, repr=False, compare=False)
+    at_top: tuple[AtTop, ...] | None = field(default=None, repr=False, compare=False)
     band_hz: tuple[float, float] | None = None
     outside: int = 0
 

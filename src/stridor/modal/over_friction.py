@@ -307,6 +307,6 @@ def _solved_onsets(
     returning: list[Returning] = []
     parts = with_origins(parts, wider, residual, returning)
     leaving = [(r.before, r.lam) for r in returning if r.jumps]
-    found = joined_onsets(parts, (solid[0].low, solid[-1].high), border, residual, leaving)
+    found = joined_onsets(parts, (solid[0].low, solid[-1].high), border, residual, leaving, (low, high))
     told = [r.words(solid[r.before].high) for r in returning]
     return replace(found, notes=(*found.notes, *stretch_words(over), *told))

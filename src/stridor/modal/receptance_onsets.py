@@ -22,13 +22,13 @@ from .full.family import Family
 from .histories import Entries, StabilityChange, imbalance, once_each, reported, unexplained, without_crossings
 from .meeting import partner_of
 from .newton import Root, crossing, exceptional, meeting, standstill
-from .onset import Branches, Onset, Onsets
+from .onset import AT_ONSET, Branches, Onset, Onsets
 from .options import Options
 from .quadratic.inverse_iteration import null_vectors
 from .receptance_modes import in_order, prepare, unfit_words
 from .results import grows
 from .roots import ReceptanceProblem
-from .tolerances import BELIEVED, UNSTABLE_RELATIVE
+from .tolerances import BELIEVED, SPLIT_RELATIVE, UNSTABLE_RELATIVE
 from .tracking import RootState, Tracker
 from .unfit import Unfit
 from .vectors import fixed_vectors
@@ -99,13 +99,12 @@ def onsets_by_receptance(
     judge, family = BackwardError(coupling), _PointFamily(coupling, (0.0, high))
     passed = [
         (StabilityChange(event.mu, _concerned(event), _located(spectrum, family, judge, event, order, has_damping)), k)
-        for k, event in enumerate(events)
-        if event.mu > 0.0 or event.branch in grown  # growth that stays within rounding all over the range is none
+        for k, event in _beyond_rounding(events, grown)
     ]
     passed = [passed[k] for k in without_crossings([change for change, _ in passed])]
     changes = [change for change, _ in passed]
     return Onsets(
-        tuple(reported(changes, entries, (low, high), max_frequency_hz)),
+        tuple(reported(changes, entries, (low, high), max_frequency_hz, _begun(start, has_damping, top))),
         (low, high),
         max_frequency_hz,
         has_damping,
@@ -115,11 +114,29 @@ def onsets_by_receptance(
         unexplained=unexplained(
             end.branch[_inside(end.roots, top)].tolist(),
             start.branch[_inside(start.roots, np.inf)].tolist(),
-            [c for c in changes if c.onset is not None and c.onset.mu >= low],
+            [c for c in changes if c.onset is not None and c.onset.mu >= low - AT_ONSET * high],
         ),
-        unbalanced=_unbalanced([(c, events[k]) for c, k in passed if k >= before], start, end, top),
+        unbalanced=_unbalanced(
+            [(c, events[k]) for c, k in passed if k >= before or _at_low(c, start, (low, high))], start, end, top
+        ),
         followed=(_numbered(start, spectrum, order, top), _numbered(end, spectrum, order, top)),
+        at_top=tuple(p for p in entries.passed if p.low >= low),
     )
+
+
+def _beyond_rounding(events: list[_Event], grown: set[int]) -> list[tuple[int, _Event]]:
+    """The passages, each with its place, without growth that begins with friction itself and stays within rounding all
+    over the range, and without where that ends. grown: the branches seen to grow beyond it."""
+    kept: list[tuple[int, _Event]] = []
+    faint: set[int] = set()
+    for k, event in enumerate(events):
+        if event.mu == 0.0 and event.branch not in grown:
+            faint.add(event.branch)
+        elif event.stabilising and event.branch in faint:
+            faint.remove(event.branch)
+        else:
+            kept.append((k, event))
+    return kept
 
 
 class _PointFamily(Family):
@@ -151,6 +168,22 @@ def _numbered(state: RootState, spectrum: ReceptanceProblem, order: dict[int, in
     fixed = sorted(set(range(1, len(order) + len(spectrum.fixed) + 1)) - set(order.values()))
     unseen = spectrum.fixed[in_order(spectrum.fixed, top)]
     return np.array(numbers + fixed, dtype=np.int64), np.concatenate([state.roots[known], unseen])
+
+
+def _at_low(change: StabilityChange, start: RootState, between: tuple[float, float]) -> bool:
+    """Whether growth begins at the low end itself, which rounding has put behind it, and does not count there."""
+    onset, (low, high) = change.onset, between
+    if onset is None or onset.stabilising or onset.mu < low - AT_ONSET * high:
+        return False
+    return not set(change.branches) & set(start.branch[grows(start.roots, 0.0)].tolist())
+
+
+def _begun(state: RootState, has_damping: bool, top: float) -> set[int]:
+    """The branches that surely grow at one μ: beside a meeting the root of what is rounding may be growth. What
+    diverges has no frequency to be held against but the band's, top [1/s]."""
+    rounding = UNSTABLE_RELATIVE if has_damping else SPLIT_RELATIVE
+    scale = np.where(state.roots.imag == 0.0, top, np.abs(state.roots))
+    return set(state.branch[state.roots.real > rounding * scale].tolist())
 
 
 def _inside(roots: ComplexArray, top: float) -> BoolArray:

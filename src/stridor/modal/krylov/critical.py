@@ -103,7 +103,7 @@ def krylov_onsets(
         lost = _lost(passage, top) if onset is None else (0, 0)
         changes.append(StabilityChange(passage.low, concerned, onset, lost))
     return Onsets(
-        tuple(reported(changes, way.entries, (low, high), max_frequency_hz)),
+        tuple(reported(changes, way.entries, (low, high), max_frequency_hz, way.from_start)),
         (low, high),
         max_frequency_hz,
         problem.damped,
@@ -117,6 +117,7 @@ def krylov_onsets(
             changes, *(state.values[_growing(telling, state, top)] for state in (way.start, way.end))
         ),
         followed=(_numbered(way.start), _numbered(way.end)),
+        at_top=tuple(way.entries.passed),
     )
 
 
