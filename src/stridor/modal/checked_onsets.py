@@ -304,11 +304,15 @@ def _roots_amiss(found: Onsets, start: Growing, end: Growing) -> list[str]:
 
 
 def _ends_before(found: Onsets, start: Growing) -> list[str]:
-    """What is wrong where growth is said to end that had not begun."""
+    """What is wrong where growth is said to end that had not begun; at the low end itself rounding decides whether it
+    grows there."""
+    low, high = found.friction_range
     count = growing_roots(start.values) + 2 * len(found.entering)
     if found.followed is not None:
         count += growing_roots(_slow(found.followed[0][1], start))
     for onset in found.onsets:
+        if onset.stabilising and onset.mu - low <= AT_ONSET * high:
+            count = max(count, -onset.roots)
         count += onset.roots
         if count < 0:
             return [f"growth of a mode that did not grow is said to end at μ = {onset.mu:.9g}"]
