@@ -53,8 +53,10 @@ bench: $(STAMP)  ## the quick benchmarks in short mode (LANES=2: two at once, wh
 lint: $(STAMP)  ## ruff
 	$(BIN)/python -m ruff check .
 
-types: $(STAMP)  ## ty on src, in seconds
+types: $(STAMP)  ## ty on src, in seconds; of benchmarks whether they call what there is, as most run weekly only
 	$(BIN)/python -m ty check --python $(BIN)/python --error-on-warning --no-progress
+	$(BIN)/python -m ty check --python $(BIN)/python --error-on-warning --no-progress --ignore all --error unknown-argument \
+	  --error too-many-positional-arguments --error missing-argument --error unresolved-reference benchmarks/*.py
 
 types-strict: $(STAMP)  ## pyright, strict, on src: minutes; before a release or after larger changes
 	$(BIN)/python -m basedpyright --pythonpath $(BIN)/python

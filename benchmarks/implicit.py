@@ -50,7 +50,7 @@ def cost(case: Case, settings: Settings, parts: tuple[int, ...]) -> float:
     schedule = lay_out(
         phases, stepper.scheme.step, list(system.loads), list(system.motion.names), system.motion.full_distance
     )
-    stepper.begin(schedule, settings, None, None)
+    stepper.begin(schedule, settings, None)
     offline = time.process_time() - started
     stepper.make_room(schedule, settings)
     stepper.use_threads(two=False)
