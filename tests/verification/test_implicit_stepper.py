@@ -548,6 +548,24 @@ def test_a_run_that_is_cut_goes_on_to_the_last_digit(monkeypatch: pytest.MonkeyP
     assert np.abs(changed.displacement[len(part.time)] - whole.displacement[len(part.time)]).max() < 1e-9
 
 
+def test_nodes_that_part_and_strike_go_on_to_the_last_digit(monkeypatch: pytest.MonkeyPatch, tmp_path):
+    """Which nodes have a place in the operator that is swept hangs on what went before; what comes out does not."""
+    case = pad()
+    whole = st.simulate(case)
+    assert len(np.unique([np.flatnonzero(s != OPEN).size for s in whole.nodes.status])) > 10
+
+    def stop(done: int, planned: int) -> None:
+        if done > 0.6 * planned:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        in_chunks(patch, 7)
+        part = st.simulate(case, progress=stop)
+    again = st.simulate(case, restart=st.open(st.save(part, tmp_path / "part.nc")))
+    for name in ("time", "normal_force", "displacement", "status", "kinetic"):
+        assert np.array_equal(getattr(again, name), getattr(whole, name)), name
+
+
 def test_steps_follow_from_the_highest_frequency_and_the_phases():
     case = st.loads(template_text("two-beams")).with_(SHORT | {"temporal.stepper": "implicit", "temporal.step": None})
     result = st.simulate(case.with_({"modal.max_frequency_hz": 10e3}))

@@ -20,6 +20,7 @@ from .basis import Basis, complete_basis
 COMPLETE = 1000  # freedoms up to which all modes are taken
 SHIFT = 1e-3  # of the highest frequency: what keeps a body regular that nothing holds
 DEPENDENT = 1e-10  # of a unit vector, squared: what a static answer must add to the others to count
+SEPARATE = 1e-3  # the same, from which on they are orthogonal but for rounding at once
 MOST_MODES = 1500
 TOLERANCE = 1e-7  # of the squares of their frequencies
 FEW_MORE = 4
@@ -91,13 +92,22 @@ def coordinates(system: System, pushed: Sparse, highest_hz: float | None, small:
     modes = modes / np.sqrt(np.einsum("ij,ij->j", modes, mass @ modes))
     for _ in range(2):
         static -= modes @ ((mass @ modes).T @ static)
-    static = _independent(static, mass)  # of unit mass, and orthogonal to the modes
-    vectors = np.hstack([modes, static])
-    squares, turn = sl.eigh(vectors.T @ (stiffness @ vectors))
-    vectors = vectors @ turn
+    static, turned = _independent(static, mass)  # of unit mass, and orthogonal to the modes
+    vectors, squares = _ritz(modes, static, turned, stiffness)
     rounding = 1e-12 * float(squares.max(initial=0.0))
     squares = np.where(np.abs(squares) < min(rounding, 1e-8 * omega**2), 0.0, squares)
     return Coordinates(Basis(vectors, squares, vectors.T @ (system.damping @ vectors)), modes.shape[1], highest_hz)
+
+
+def _ritz(modes: Array, static: Array, turned: Array, stiffness: Sparse) -> tuple[Array, Array]:
+    """Vectors (n, k) that modes (n, a) and statics (n, b) @ turned (b, c) span, all of unit mass, along which K is
+    diagonal, and its diagonal (k,) [rad²/s²]."""
+    own, own_static = stiffness @ modes, stiffness @ static
+    across = turned.T @ (static.T @ own)
+    beyond = turned.T @ (static.T @ own_static) @ turned
+    squares, turn = sl.eigh(np.block([[modes.T @ own, across.T], [across, beyond]]))
+    count = modes.shape[1]
+    return static @ (turned @ turn[count:]) + modes @ turn[:count], squares
 
 
 def _how_many(stiffness: Sparse, mass: Sparse, omega: float) -> int:
@@ -118,15 +128,20 @@ def _held(stiffness: Sparse, mass: Sparse, omega: float) -> tuple[Factor, float]
         return factorise(sp.csr_array(stiffness + shift * mass), symmetric=True), shift
 
 
-def _independent(static: Array, mass: Sparse) -> Array:
-    """Vectors of unit mass that span what the columns (n, k) do."""
-    for _ in range(2):
-        length = np.sqrt(np.einsum("ij,ij->j", static, mass @ static))
-        static = static[:, length > 0.0] / length[length > 0.0]
-        squares, turn = sl.eigh(static.T @ (mass @ static))
+def _independent(static: Array, mass: Sparse) -> tuple[Array, Array]:
+    """Vectors (n, b) and how they are combined (b, c) to c of unit mass that span what the columns (n, k) do. Products
+    with these long columns are what it costs: a second one is made only where rounding needs it."""
+    while True:
+        square = static.T @ (mass @ static)
+        length = np.sqrt(np.diag(square))
+        some = length > 0.0
+        squares, turn = sl.eigh(square[np.ix_(some, some)] / np.outer(length[some], length[some]))
         keep = squares > DEPENDENT
-        static = static @ (turn[:, keep] / np.sqrt(squares[keep]))
-    return static
+        turned = np.zeros((len(length), int(keep.sum())))
+        turned[some] = turn[:, keep] / np.sqrt(squares[keep]) / length[some, None]
+        if squares[keep].min(initial=1.0) > SEPARATE:
+            return static, turned
+        static = static @ turned
 
 
 def truncated(system: System, cutoff_hz: float) -> Coordinates:

@@ -78,8 +78,8 @@ class Work(NamedTuple):
     without impulses (`node_law`); total (m d,): with them; slip (m d,): velocity at the start of the step; start (m,)
     [m]: gap then; apart (m d,): what free has beside the velocity of the structure behind the step; impulse (m d,);
     status (m,); sums (c, 6); local (5, d) of one node; rate (p,). Of the nodes that are swept: chosen (m,), marked
-    (m,), near (m d,) their totals, packed (m d, m d) their part of the Delassus operator, kept_chosen (m,) and
-    kept_count (1,) whose it is."""
+    (m,). Of those that have a place in packed (m d, m d), the part of the Delassus operator that is theirs: near (m d,)
+    totals, place_of (m,) the place of a node, −1 without one, holder (m,) whose a place is, used (1,) how many."""
 
     change: Array
     force: Array
@@ -97,8 +97,9 @@ class Work(NamedTuple):
     marked: IntArray
     near: Array
     packed: Array
-    kept_chosen: IntArray
-    kept_count: IntArray
+    place_of: IntArray
+    holder: IntArray
+    used: IntArray
 
 
 class Record(NamedTuple):

@@ -16,7 +16,7 @@ from ..sparse.node_table import sliding_directions
 from .arrays import COUNTERS, Nodes, StepState, Structure, Work
 from .warp import warped
 
-COUPLED = 1e-9  # of the damping: what beside the diagonal counts
+COUPLED = 1e-4  # of the power that a motion loses: up to there what coordinates take from one another is left out
 
 
 def structure_of(system: System, basis: Basis, step: float) -> Structure:
@@ -24,8 +24,7 @@ def structure_of(system: System, basis: Basis, step: float) -> Structure:
     motion, r = system.motion, basis.size
     found = warped(basis.stiffness, basis.damping, step)
     diagonal = np.diag(found.damping).copy()
-    largest = float(np.abs(found.damping).max(initial=0.0))
-    coupled = bool(np.abs(found.damping - np.diag(diagonal)).max(initial=0.0) > COUPLED * largest)
+    coupled = coupling(found.damping) > COUPLED
     effective = found.mass + 0.25 * step**2 * found.stiffness
     solved = sl.inv(np.diag(effective) + 0.5 * step * found.damping) if coupled else np.zeros((0, 0))
     loads = np.array(list(system.loads.values()), dtype=float).reshape(len(system.loads), system.size)
@@ -45,6 +44,20 @@ def structure_of(system: System, basis: Basis, step: float) -> Structure:
         damping_own=np.array(motion.damping_own, dtype=float),
         stiffness_own=np.array(motion.stiffness_own, dtype=float),
     )
+
+
+def coupling(damping: Array) -> float:
+    """What the coupling of coordinates by damping (r, r) makes of the power vᵀCv that a motion loses, of what the
+    diagonal D makes of it, for any motion: at most |D^−½ (C − D) D^−½|. Infinite where D has a zero and C more."""
+    diagonal = np.diag(damping)
+    beside = damping - np.diag(diagonal)
+    some = np.any(beside, axis=0)
+    if not np.any(some):
+        return 0.0
+    if np.any(diagonal[some] <= 0.0):
+        return np.inf
+    size = np.sqrt(diagonal[some])
+    return float(np.linalg.norm(beside[np.ix_(some, some)] / np.outer(size, size), 2))
 
 
 def nodes_of(
@@ -87,6 +100,6 @@ def work_space(nodes: Nodes, structure: Structure, contacts: int, directions: in
         start=np.zeros(m), apart=np.zeros(total), impulse=np.zeros(total), status=np.zeros(m, dtype=np.int64),
         sums=np.zeros((contacts, 6)), local=np.zeros((5, directions + 1)), rate=np.zeros(len(structure.inertia)),
         chosen=np.zeros(m, dtype=np.int64), marked=np.zeros(m, dtype=np.int64), near=np.zeros(total),
-        packed=np.zeros((total, total)), kept_chosen=np.zeros(m, dtype=np.int64),
-        kept_count=np.zeros(1, dtype=np.int64),
+        packed=np.zeros((total, total)), place_of=np.full(m, -1, dtype=np.int64), holder=np.zeros(m, dtype=np.int64),
+        used=np.zeros(1, dtype=np.int64),
     )  # fmt: skip

@@ -80,15 +80,17 @@ def _free(loads: Array, rate: Array, a: Structure, state: StepState, work: Work)
         if mean != 0.0:
             _add(work.force, a.drag[p], -mean)
     for i in range(r):
-        spring = a.stiffness[i] * (state.q[i] + 0.5 * h * state.v[i])
-        work.change[i] = h * (work.force[i] - _drag(a, state.v, i) - spring)
+        work.change[i] = h * (work.force[i] - a.stiffness[i] * (state.q[i] + 0.5 * h * state.v[i]))
     if a.solved.shape[0]:
+        # hC̃v = 2 (M̂ − E) v with E = M̃ + h²K/4: one product with a full matrix, not two.
         right = work.change.copy()
         for i in range(r):
-            work.change[i] = _dot(a.solved[i], right)
+            right[i] += 2.0 * (a.mass[i] + 0.25 * h * h * a.stiffness[i]) * state.v[i]
+        for i in range(r):
+            work.change[i] = _dot(a.solved[i], right) - 2.0 * state.v[i]
     else:
         for i in range(r):
-            work.change[i] *= a.inverse[i]
+            work.change[i] = a.inverse[i] * (work.change[i] - h * a.damping[i] * state.v[i])
 
 
 @njit(cache=True)

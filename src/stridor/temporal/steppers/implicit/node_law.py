@@ -30,6 +30,7 @@ _solve_contact = njit(cache=True, allocates=False)(multipliers.solve_contact)
 GOES_ON = 0.5  # of its speed that a slip must keep to be taken as one that goes on without further ado
 FIRST = 4  # sweeps before those that their impulses close join in
 SWEEP_LIMIT = 500
+SPARE = 1.5  # times the nodes that are swept: the places there may be for them
 NEWTON_STEPS = 60  # on the force of a spring that opens or closes
 SWEEP_TOLERANCE = 1e-11
 
@@ -187,21 +188,27 @@ def _stays_open(i: int, d: int, nodes: Nodes, work: Work) -> bool:  # pragma: no
 
 
 @njit(cache=True, allocates=False)
-def _pack(count: int, d: int, nodes: Nodes, work: Work) -> None:  # pragma: no cover - compiled
-    """The Delassus operator of the chosen nodes alone into work.packed, where it is not there from the step before."""
-    same = work.kept_count[0] == count
+def _pack(count: int, d: int, nodes: Nodes, work: Work) -> int:  # pragma: no cover - compiled
+    """See to it that the chosen nodes have places in work.packed, where the Delassus operator of those that have one
+    stands together; places taken. They stay from step to step, until too many nodes have one that are not chosen."""
+    used = work.used[0]
+    if used > SPARE * count + d:
+        work.place_of[:] = -1
+        used = 0
     for a in range(count):
-        same = same and work.kept_chosen[a] == work.chosen[a]
-    if same:
-        return
-    work.kept_count[0] = count
-    for a in range(count):
-        work.kept_chosen[a] = work.chosen[a]
-        for j in range(d):
-            row, out = nodes.delassus[work.chosen[a] * d + j], work.packed[a * d + j]
-            for b in range(count):
+        i = work.chosen[a]
+        if work.place_of[i] >= 0:
+            continue
+        work.place_of[i], work.holder[used] = used, i
+        used += 1
+        for b in range(used):
+            other = work.holder[b]
+            for j in range(d):
                 for k in range(d):
-                    out[b * d + k] = row[work.chosen[b] * d + k]
+                    work.packed[(used - 1) * d + j, b * d + k] = nodes.delassus[i * d + j, other * d + k]
+                    work.packed[b * d + k, (used - 1) * d + j] = nodes.delassus[other * d + k, i * d + j]
+    work.used[0] = used
+    return used
 
 
 @njit(cache=True, allocates=False)
@@ -210,19 +217,21 @@ def _sweeps(
 ) -> tuple[bool, int]:  # pragma: no cover - compiled
     """Up to so many sweeps over the chosen nodes: whether they settled, and how many were done."""
     d, new = work.local.shape[1], work.local[0]
-    near = work.near[: count * d]
+    wide = _pack(count, d, nodes, work) * d
+    near = work.near[:wide]
     for a in range(count):
+        i = work.chosen[a]
         for j in range(d):
-            near[a * d + j] = work.total[work.chosen[a] * d + j]
+            near[work.place_of[i] * d + j] = work.total[i * d + j]
     sweep, settled = 0, False
     while sweep < limit and not settled:
         sweep += 1
         worst = largest = 0.0
         for a in range(count):
             i = work.chosen[a]
-            at = i * d
+            at, place = i * d, work.place_of[i] * d
             for j in range(d):
-                work.total[at + j] = near[a * d + j]
+                work.total[at + j] = near[place + j]
             if _stays_open(i, d, nodes, work):
                 work.status[i] = _OPEN
                 continue
@@ -233,13 +242,14 @@ def _sweeps(
                 if change != 0.0:
                     size += abs(change)
                     work.impulse[at + j] = new[j]
-                    _add(near, work.packed[a * d + j, : count * d], change)
+                    _add(near, work.packed[place + j, :wide], change)
             worst = max(worst, size)
             largest = max(largest, abs(new[0]))
         settled = worst <= SWEEP_TOLERANCE * largest or count == 1 or math.isnan(worst)
     for a in range(count):
+        i = work.chosen[a]
         for j in range(d):
-            work.total[work.chosen[a] * d + j] = near[a * d + j]
+            work.total[i * d + j] = near[work.place_of[i] * d + j]
     return settled, sweep
 
 
@@ -262,7 +272,6 @@ def solve_nodes(limit: int, h: float, nodes: Nodes, state: StepState, work: Work
                 count += 1
         if count == before and settled:
             return max(done, 1)
-        _pack(count, d, nodes, work)
         # First a few sweeps, in which most of those that join in show.
         few = FIRST if done == 0 and count < m else limit - done
         settled, swept = _sweeps(count, few, h, nodes, state, work)
