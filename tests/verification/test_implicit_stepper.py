@@ -553,6 +553,10 @@ def test_nodes_that_part_and_strike_go_on_to_the_last_digit(monkeypatch: pytest.
     case = pad()
     whole = st.simulate(case)
     assert len(np.unique([np.flatnonzero(s != OPEN).size for s in whole.nodes.status])) > 10
+    assert "nodes part and strike" in whole.path_reason
+    assert f"--set temporal.step={whole.step / 4:.4g} --set modal.max_frequency_hz=12000" in whole.path_reason
+    calm = st.simulate(pad(**{"temporal.perturbation": 1e-6}))
+    assert "nodes part" not in calm.path_reason
 
     def stop(done: int, planned: int) -> None:
         if done > 0.6 * planned:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
+from ....contact.multipliers import OPEN
 from ....contact.nodes import ContactNodes
 from ....errors import AnalysisError, CaseError
 from ....sliding.solution import steady_sliding
@@ -119,6 +120,7 @@ class ImplicitStepper:
         self.structure: Structure = structure_of(system, basis, settings.step)
         self.nodes: Nodes = nodes_of(system, nodes, rows, lift, basis, self.structure)
         self.left_out = 0.0  # of the initial displacement or velocity, by mass
+        self._parted = False  # whether a node that touched was seen open later
         self.contact_names, self.closed = nodes.names, nodes.closed
         self.parts = sketch(system, nodes)
         self.moving: StepState = fresh_state(self.nodes, self.structure, len(nodes.names))
@@ -145,6 +147,15 @@ class ImplicitStepper:
         angle = self.scheme.step * (self._highest_hz or 0.0)
         if angle > ROUGH:
             said += f"; {1 / angle:.3g} steps to the period of {self._highest_hz:g} Hz are few"
+        if self._parted:
+            kept = "" if self.coordinates.complete else " and on the modes kept"
+            again = f"--set temporal.step={self.scheme.step / 4:.4g}"
+            if kept and self._highest_hz is not None:
+                again += f" --set modal.max_frequency_hz={4 * self._highest_hz:g}"
+            said += (
+                f"; nodes part and strike: how many are open or stick, and mean friction, hang on the step{kept} "
+                f"(docs/theory-implicit.md); see by how much with {again}"
+            )
         return said
 
     @property
@@ -323,8 +334,10 @@ class ImplicitStepper:
     def advance(self, steps: int, schedule: Schedule, phase: str) -> None:
         """Up to so many steps."""
         last, given = self.done + steps, False
+        touched = self.moving.status != OPEN
         while self.done < last:
             code = self._march(last - self.done, schedule, given=given)
+            self._parted |= bool(np.any(touched & (self.moving.status == OPEN)))
             given = code == HARD
             if given:
                 newton(self.scheme.step, self.nodes, self.moving, self.work)
