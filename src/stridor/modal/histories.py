@@ -12,6 +12,8 @@ from ..typing import ComplexArray, IntArray
 from .onset import AT_ONSET, AtTop, Onset
 from .tolerances import SPLIT_RELATIVE, UNSTABLE_RELATIVE
 
+ALIKE = 0.05  # of a frequency: how far apart the beginning and the end of a mode's growth within rounding may be
+
 
 @dataclass(frozen=True)
 class StabilityChange:
@@ -173,27 +175,52 @@ def _is_one_of(change: StabilityChange, others: Iterable[StabilityChange]) -> bo
     )
 
 
-def crossings(onsets: Sequence[Onset]) -> set[int]:
-    """Places in ``onsets`` of those that are no more than undamped modes that cross: rounding makes them meet and part
-    again at one place, in either order, and what they do in between is rounding as well, growth of κ√Δμ at most."""
+def within_rounding(onsets: Sequence[Onset]) -> set[int]:
+    """Places in ``onsets`` of beginnings and ends between which a mode grows by rounding alone:
+    a damping ratio that only touches zero, which Newton's method finds twice beside it, and undamped modes that cross,
+    which rounding makes meet and part again at one place, in either order.
+
+    With zeros a and b, b − a = w, and slopes s and −s' there the growth between them is that of the cubic, at most
+    4/27 (s + s') w; where undamped modes meet it is κ √w at most. Up to a share of |λ| it counts nowhere as growth.
+    """
     found: set[int] = set()
     for k, begins in enumerate(onsets):
-        for m, ends in enumerate(onsets):
-            if begins.stabilising or not ends.stabilising or begins.branches != ends.branches:
-                continue
-            opens, closes = begins.square_root_coefficient, ends.square_root_coefficient
-            if m in found or opens is None or closes is None:
-                continue
-            grows = max(opens, closes) * np.sqrt(abs(ends.mu - begins.mu))
-            if grows <= SPLIT_RELATIVE * 2 * pi * begins.frequency_hz:
+        if begins.stabilising:
+            continue
+        ends = (m for m, o in enumerate(onsets) if o.stabilising and m not in found and _of_one_mode(begins, o))
+        for m in sorted(ends, key=lambda m: abs(onsets[m].mu - begins.mu)):
+            if _stays_within(begins, onsets[m]):
                 found |= {k, m}
                 break
     return found
 
 
-def without_crossings(changes: Sequence[StabilityChange]) -> list[int]:
-    """Places of the changes that are left without modes that cross (`crossings`), found at both branches or at one."""
+def _of_one_mode(one: Onset, other: Onset) -> bool:
+    """Whether two onsets may be of the same mode: by their branches, where numbered, and their frequencies."""
+    numbered = any(one.branches) and any(other.branches)
+    if numbered and not set(one.branches) & set(other.branches):
+        return False
+    return abs(one.frequency_hz - other.frequency_hz) <= ALIKE * max(one.frequency_hz, other.frequency_hz)
+
+
+def _stays_within(begins: Onset, ends: Onset) -> bool:
+    """Whether growth between its beginning and its end is rounding (`within_rounding`)."""
+    size, width = 2 * pi * begins.frequency_hz, ends.mu - begins.mu
+    slopes = [abs(o.growth_slope) for o in (begins, ends) if o.growth_slope is not None]
+    opens = [o.square_root_coefficient for o in (begins, ends) if o.growth_slope is None]
+    roots = [kappa for kappa in opens if kappa is not None]
+    if len(slopes) + len(roots) < 2:
+        return False
+    grows = max(4 / 27 * sum(slopes) * abs(width), *(kappa * np.sqrt(abs(width)) for kappa in roots), 0.0)
+    if not slopes:
+        return bool(grows <= SPLIT_RELATIVE * size)
+    return bool(width >= 0.0 and grows <= UNSTABLE_RELATIVE * size)
+
+
+def beyond_rounding(changes: Sequence[StabilityChange]) -> list[int]:
+    """Places of the changes that are left without those of growth within rounding (`within_rounding`), found at both
+    branches or at one."""
     solved = [c for c in once_each(changes) if c.onset is not None]
     onsets = [c.onset for c in solved if c.onset is not None]
-    gone = [solved[k] for k in crossings(onsets)]
+    gone = [solved[k] for k in within_rounding(onsets)]
     return [k for k, change in enumerate(changes) if not _is_one_of(change, gone)]

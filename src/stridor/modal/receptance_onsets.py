@@ -19,7 +19,7 @@ from ..typing import BoolArray, ComplexArray, Sparse
 from .backward_error import BackwardError
 from .coupling import PointCoupling
 from .full.family import Family
-from .histories import Entries, StabilityChange, imbalance, once_each, reported, unexplained, without_crossings
+from .histories import Entries, StabilityChange, beyond_rounding, imbalance, once_each, reported, unexplained
 from .meeting import partner_of
 from .newton import Root, crossing, exceptional, meeting, standstill
 from .onset import AT_ONSET, Branches, Onset, Onsets
@@ -101,7 +101,7 @@ def onsets_by_receptance(
         (StabilityChange(event.mu, _concerned(event), _located(spectrum, family, judge, event, order, has_damping)), k)
         for k, event in _beyond_rounding(events, grown)
     ]
-    passed = [passed[k] for k in without_crossings([change for change, _ in passed])]
+    passed = [passed[k] for k in beyond_rounding([change for change, _ in passed])]
     changes = [change for change, _ in passed]
     return Onsets(
         tuple(reported(changes, entries, (low, high), max_frequency_hz, _begun(start, has_damping, top))),

@@ -16,7 +16,7 @@ import numpy as np
 from ...typing import ComplexArray
 from ..at_rest import moving
 from ..dense_problem import eigenvalues
-from ..histories import crossings
+from ..histories import within_rounding
 from ..krylov.exceptional import exceptional_point
 from ..krylov.follow import BranchState
 from ..krylov.passages import Passage
@@ -118,8 +118,8 @@ def solved(
             one = replace(one, onset=replace(one.onset, enters_at=entry))
         if not any(_same(one.onset, other.onset, family) for other in found):
             found.append(one)
-    crossed = crossings([f.onset for f in found])
-    found = [f for k, f in enumerate(found) if k not in crossed]
+    rounding = within_rounding([f.onset for f in found])
+    found = [f for k, f in enumerate(found) if k not in rounding]
     inside = (f.onset for f in found if between[0] <= f.onset.mu <= between[1])
     said = sum(o.roots for o in inside)
     balance += said

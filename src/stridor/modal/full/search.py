@@ -14,6 +14,7 @@ import numpy as np
 
 from ...errors import AnalysisError
 from ..at_rest import more_slow, moving
+from ..histories import within_rounding
 from ..onset import Onset
 from ..quadratic import RegionModes
 from .axis import walked
@@ -219,7 +220,9 @@ def _walked(
     walk = walked(family, between, top, ends[0].values)
     if walk is None:
         return None
-    onsets = tuple(sorted((as_onset(family, root) for root in walk.roots), key=_order))
+    every = sorted((as_onset(family, root) for root in walk.roots), key=_order)
+    rounding = within_rounding(every)
+    onsets = tuple(o for k, o in enumerate(every) if k not in rounding)
     number = _number_by(family, top)
     grid = tuple((mu, number(mu)) for mu in _sampled(onsets, between))
     seen = Counted(grid, onsets, ())

@@ -16,7 +16,7 @@ from ...stages import passing, stage
 from ...system import System
 from ...threads import one_thread
 from ...typing import BoolArray, ComplexArray, IntArray
-from ..histories import Entries, StabilityChange, reported, unbalanced, unexplained
+from ..histories import Entries, StabilityChange, beyond_rounding, reported, unbalanced, unexplained
 from ..onset import Onset, Onsets
 from ..options import Options
 from ..quadratic.reach import searched
@@ -102,6 +102,7 @@ def krylov_onsets(
         onset = _located(telling if passage.kind == "crossing" else reduced, passage, (0.0, high), limit)
         lost = _lost(passage, top) if onset is None else (0, 0)
         changes.append(StabilityChange(passage.low, concerned, onset, lost))
+    changes = [changes[k] for k in beyond_rounding(changes)]
     return Onsets(
         tuple(reported(changes, way.entries, (low, high), max_frequency_hz, way.from_start)),
         (low, high),
