@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import pi
 
@@ -28,37 +28,57 @@ class StabilityChange:
     lost: tuple[int, int] = (0, 0)
 
 
+@dataclass(frozen=True)
+class _Entry:
+    """A branch that comes into the band between two neighbouring μ, about at ``at``, and whether it may grow there."""
+
+    low: float
+    high: float
+    at: float
+    grows: bool
+
+
 class Entries:
     """Where branches come into the band from above its end at the angular frequency top [1/s], and ``passed``: all that
     pass it either way and may grow there."""
 
     def __init__(self, top: float) -> None:
         self.top = top
-        self.found: dict[int, list[tuple[float, float]]] = {}
+        self.found: dict[int, list[_Entry]] = {}
         self.passed: list[AtTop] = []
 
     def watch(
         self, between: tuple[float, float], old: ComplexArray, new: ComplexArray, branch: Sequence[int] | IntArray
     ) -> None:
         """Take note of the eigenvalues old (k,) and new (k,) of branches (k,) at two neighbouring μ."""
-        came = np.flatnonzero((old.imag > self.top) & (new.imag <= self.top))
         step = between[1] - between[0]
-        for i in came.tolist():
-            part = float((old.imag[i] - self.top) / (old.imag[i] - new.imag[i]))
-            self.found.setdefault(int(branch[i]), []).append((between[0] + part * step, step))
         for i in np.flatnonzero((old.imag > self.top) != (new.imag > self.top)).tolist():
             growth = [float(v.real) / max(abs(v), 1e-300) for v in (old[i], new[i])]
-            if max(growth) <= UNSTABLE_RELATIVE:
+            grows, up = max(growth) > UNSTABLE_RELATIVE, new[i].imag > self.top
+            if not up:
+                part = float((old.imag[i] - self.top) / (old.imag[i] - new.imag[i]))
+                entry = _Entry(*between, between[0] + part * step, grows)
+                self.found.setdefault(int(branch[i]), []).append(entry)
+            if not grows:
                 continue
             least = 2 if min(growth) > SPLIT_RELATIVE else 0
-            up = new[i].imag > self.top
             self.passed.append(AtTop(*between, *((least, 2) if up else (-2, -least))))
 
-    def after(self, branches: tuple[int, ...], mu: float, before: float) -> float | None:
-        """The first μ in [mu, before] at which one of these branches comes into the band, to about a step."""
-        entering = [
-            max(at, mu) for b in branches for at, step in self.found.get(b, []) if at >= mu - step and at <= before
-        ]
+    def after(self, branches: tuple[int, ...], mu: float, end: Onset | None = None) -> float | None:
+        """The first μ from ``mu`` on, where one of these branches grows, at which it comes into the band with that
+        growth, to about a step; end: the onset where the growth ends, None: where none was seen.
+
+        It does not where both sides of the step decay, nor behind the end. Of one step with the end that end's
+        frequency says which of them is the first.
+        """
+        entering: list[float] = []
+        for entry in (entry for b in branches for entry in self.found.get(b, [])):
+            if entry.high < mu or not (entry.grows or entry.low <= mu):
+                continue
+            if end is None or entry.high <= end.mu:
+                entering.append(max(entry.at, mu))
+            elif entry.low <= end.mu and 2 * pi * end.frequency_hz <= self.top:
+                entering.append(min(max(entry.at, mu), end.mu))
         return min(entering, default=None)
 
 
@@ -85,9 +105,8 @@ def reported(
         if onset.frequency_hz > max_frequency_hz:
             if onset.stabilising:
                 continue
-            ends = _next_end(every, change, onset.mu)
-            enters = entries.after(change.branches, onset.mu, min(ends, high))
-            if enters is None:
+            enters = entries.after(change.branches, onset.mu, next_end(every, change.branches, onset.mu))
+            if enters is None or enters > high:
                 continue
             onset = replace(onset, enters_at=enters)
         if not any(_same(onset, other) for other in kept):
@@ -95,21 +114,29 @@ def reported(
     return sorted(kept, key=_order)
 
 
+def entering(
+    growing: Mapping[int, complex], changes: Sequence[StabilityChange], entries: Entries, low: float
+) -> tuple[tuple[complex, float], ...]:
+    """λ of branches that are ``growing`` above the band where the range begins, by number, and the μ at which they come
+    into it with that growth."""
+    above = {b: lam for b, lam in growing.items() if lam.imag > entries.top}
+    came = {b: entries.after((b,), low, next_end(changes, (b,), low)) for b in above}
+    return tuple((lam, mu) for b, lam in above.items() if (mu := came[b]) is not None)
+
+
 def _order(onset: Onset) -> tuple[float, float]:
     return onset.mu, onset.frequency_hz
 
 
-def _next_end(every: list[StabilityChange], change: StabilityChange, mu: float) -> float:
-    """The next μ at which growth of all of these branches ends."""
+def next_end(every: Iterable[StabilityChange], branches: Iterable[int], mu: float) -> Onset | None:
+    """The next onset beyond ``mu`` at which growth of these branches ends."""
+    own = set(branches)
     ends = [
-        other.onset.mu
+        other.onset
         for other in every
-        if other.onset is not None
-        and other.onset.stabilising
-        and other.onset.mu > mu
-        and set(other.branches) & set(change.branches)
+        if other.onset is not None and other.onset.stabilising and other.onset.mu > mu and set(other.branches) & own
     ]
-    return min(ends, default=np.inf)
+    return min(ends, key=_order, default=None)
 
 
 def _same(one: Onset, other: Onset) -> bool:
