@@ -13,6 +13,9 @@ import scipy.sparse.linalg as spl
 from scipy.optimize import linear_sum_assignment
 
 from stridor.errors import AnalysisError
+from stridor.modal.full import basis
+from stridor.modal.full.family import Family
+from stridor.modal.options import Options
 from stridor.modal.quadratic import Quadratic, Region, dense, find_modes, polish, undamped_count
 from stridor.modal.quadratic import count as counting
 from stridor.modal.quadratic import find as finding
@@ -554,3 +557,35 @@ def test_a_poor_pair_is_polished_even_where_it_is_defective(copies: int, given: 
         assert found[2] == side.backward_error(np.array([found[0]]), found[1][:, None])[0]
         # Copies k times over are known to the k-th root of that.
         assert abs(found[0] - 100j) < 100 * (1e-12, 1e-5, 1e-3)[copies - 1]
+
+
+def test_a_mode_that_passes_zero_beside_a_free_motion_is_not_refused(monkeypatch):
+    """Two eigenvalues that are all but one, 0 and ε, may leave left vectors no better than 1e-10: what QZ gives of small
+    problems is taken to 1e-8 where it does not get closer, as that of larger ones is, and told with what it leaves."""
+    turn = np.linalg.qr(np.random.default_rng(5).standard_normal((3, 3)))[0]
+    parts = ([1.0, 1.0, 2.0], [-1e-7, 0.02, 0.02], [0.0, 1.0, 3.0])
+    problem = Quadratic(*(sp.csr_array(turn @ np.diag(d) @ turn.T) for d in parts))
+    region = Region.band(0.0, 3.0, above=-1.0)
+    found = find_modes(problem, region, left=True, tolerance=1e-30)
+    assert len(found.values) == 4
+    assert max(found.residual.max(), found.left_residual.max()) < finding.CROWDED
+    monkeypatch.setattr(finding, "CROWDED", 1e-30)
+    with pytest.raises(AnalysisError, match="do not reach a backward error"):
+        find_modes(problem, region, left=True, tolerance=1e-30)
+    # What may be a motion as a whole need not reach it.
+    assert len(find_modes(problem, region, left=True, tolerance=1e-30, still=10.0).values) == 4
+
+
+def test_full_solves_over_friction_ask_nothing_of_motions_as_a_whole(monkeypatch):
+    asked = []
+    free = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    monkeypatch.setattr(basis, "find_modes", lambda *a, **k: asked.append(k["still"]) or find_modes(*a, **k))
+    for held in (0.0, 1.0):
+
+        def at(mu, held=held):
+            parts = np.eye(2), 0.1 * np.eye(2), (1 + 0.1 * mu) * free + held * np.eye(2)
+            return Quadratic(*(sp.csr_array(part) for part in parts))
+
+        basis.Whole(Family((0.0, 1.0), at, Options()), 2.0).eigenpairs(0.5)
+    assert asked[0] > 0.0
+    assert asked[1] == 0.0

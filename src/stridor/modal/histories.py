@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import pi
 
@@ -11,6 +11,8 @@ import numpy as np
 from ..typing import ComplexArray, IntArray
 from .onset import AT_ONSET, AtTop, Onset
 from .tolerances import SPLIT_RELATIVE, UNSTABLE_RELATIVE
+
+ALIKE = 0.05  # of a frequency: how far apart the beginning and the end of a mode's growth within rounding may be
 
 
 @dataclass(frozen=True)
@@ -26,37 +28,57 @@ class StabilityChange:
     lost: tuple[int, int] = (0, 0)
 
 
+@dataclass(frozen=True)
+class _Entry:
+    """A branch that comes into the band between two neighbouring μ, about at ``at``, and whether it may grow there."""
+
+    low: float
+    high: float
+    at: float
+    grows: bool
+
+
 class Entries:
     """Where branches come into the band from above its end at the angular frequency top [1/s], and ``passed``: all that
     pass it either way and may grow there."""
 
     def __init__(self, top: float) -> None:
         self.top = top
-        self.found: dict[int, list[tuple[float, float]]] = {}
+        self.found: dict[int, list[_Entry]] = {}
         self.passed: list[AtTop] = []
 
     def watch(
         self, between: tuple[float, float], old: ComplexArray, new: ComplexArray, branch: Sequence[int] | IntArray
     ) -> None:
         """Take note of the eigenvalues old (k,) and new (k,) of branches (k,) at two neighbouring μ."""
-        came = np.flatnonzero((old.imag > self.top) & (new.imag <= self.top))
         step = between[1] - between[0]
-        for i in came.tolist():
-            part = float((old.imag[i] - self.top) / (old.imag[i] - new.imag[i]))
-            self.found.setdefault(int(branch[i]), []).append((between[0] + part * step, step))
         for i in np.flatnonzero((old.imag > self.top) != (new.imag > self.top)).tolist():
             growth = [float(v.real) / max(abs(v), 1e-300) for v in (old[i], new[i])]
-            if max(growth) <= UNSTABLE_RELATIVE:
+            grows, up = max(growth) > UNSTABLE_RELATIVE, new[i].imag > self.top
+            if not up:
+                part = float((old.imag[i] - self.top) / (old.imag[i] - new.imag[i]))
+                entry = _Entry(*between, between[0] + part * step, grows)
+                self.found.setdefault(int(branch[i]), []).append(entry)
+            if not grows:
                 continue
             least = 2 if min(growth) > SPLIT_RELATIVE else 0
-            up = new[i].imag > self.top
             self.passed.append(AtTop(*between, *((least, 2) if up else (-2, -least))))
 
-    def after(self, branches: tuple[int, ...], mu: float, before: float) -> float | None:
-        """The first μ in [mu, before] at which one of these branches comes into the band, to about a step."""
-        entering = [
-            max(at, mu) for b in branches for at, step in self.found.get(b, []) if at >= mu - step and at <= before
-        ]
+    def after(self, branches: tuple[int, ...], mu: float, end: Onset | None = None) -> float | None:
+        """The first μ from ``mu`` on, where one of these branches grows, at which it comes into the band with that
+        growth, to about a step; end: the onset where the growth ends, None: where none was seen.
+
+        It does not where both sides of the step decay, nor behind the end. Of one step with the end that end's
+        frequency says which of them is the first.
+        """
+        entering: list[float] = []
+        for entry in (entry for b in branches for entry in self.found.get(b, [])):
+            if entry.high < mu or not (entry.grows or entry.low <= mu):
+                continue
+            if end is None or entry.high <= end.mu:
+                entering.append(max(entry.at, mu))
+            elif entry.low <= end.mu and 2 * pi * end.frequency_hz <= self.top:
+                entering.append(min(max(entry.at, mu), end.mu))
         return min(entering, default=None)
 
 
@@ -83,9 +105,8 @@ def reported(
         if onset.frequency_hz > max_frequency_hz:
             if onset.stabilising:
                 continue
-            ends = _next_end(every, change, onset.mu)
-            enters = entries.after(change.branches, onset.mu, min(ends, high))
-            if enters is None:
+            enters = entries.after(change.branches, onset.mu, next_end(every, change.branches, onset.mu))
+            if enters is None or enters > high:
                 continue
             onset = replace(onset, enters_at=enters)
         if not any(_same(onset, other) for other in kept):
@@ -93,21 +114,29 @@ def reported(
     return sorted(kept, key=_order)
 
 
+def entering(
+    growing: Mapping[int, complex], changes: Sequence[StabilityChange], entries: Entries, low: float
+) -> tuple[tuple[complex, float], ...]:
+    """λ of branches that are ``growing`` above the band where the range begins, by number, and the μ at which they come
+    into it with that growth."""
+    above = {b: lam for b, lam in growing.items() if lam.imag > entries.top}
+    came = {b: entries.after((b,), low, next_end(changes, (b,), low)) for b in above}
+    return tuple((lam, mu) for b, lam in above.items() if (mu := came[b]) is not None)
+
+
 def _order(onset: Onset) -> tuple[float, float]:
     return onset.mu, onset.frequency_hz
 
 
-def _next_end(every: list[StabilityChange], change: StabilityChange, mu: float) -> float:
-    """The next μ at which growth of all of these branches ends."""
+def next_end(every: Iterable[StabilityChange], branches: Iterable[int], mu: float) -> Onset | None:
+    """The next onset beyond ``mu`` at which growth of these branches ends."""
+    own = set(branches)
     ends = [
-        other.onset.mu
+        other.onset
         for other in every
-        if other.onset is not None
-        and other.onset.stabilising
-        and other.onset.mu > mu
-        and set(other.branches) & set(change.branches)
+        if other.onset is not None and other.onset.stabilising and other.onset.mu > mu and set(other.branches) & own
     ]
-    return min(ends, default=np.inf)
+    return min(ends, key=_order, default=None)
 
 
 def _same(one: Onset, other: Onset) -> bool:
@@ -173,27 +202,52 @@ def _is_one_of(change: StabilityChange, others: Iterable[StabilityChange]) -> bo
     )
 
 
-def crossings(onsets: Sequence[Onset]) -> set[int]:
-    """Places in ``onsets`` of those that are no more than undamped modes that cross: rounding makes them meet and part
-    again at one place, in either order, and what they do in between is rounding as well, growth of κ√Δμ at most."""
+def within_rounding(onsets: Sequence[Onset]) -> set[int]:
+    """Places in ``onsets`` of beginnings and ends between which a mode grows by rounding alone:
+    a damping ratio that only touches zero, which Newton's method finds twice beside it, and undamped modes that cross,
+    which rounding makes meet and part again at one place, in either order.
+
+    With zeros a and b, b − a = w, and slopes s and −s' there the growth between them is that of the cubic, at most
+    4/27 (s + s') w; where undamped modes meet it is κ √w at most. Up to a share of |λ| it counts nowhere as growth.
+    """
     found: set[int] = set()
     for k, begins in enumerate(onsets):
-        for m, ends in enumerate(onsets):
-            if begins.stabilising or not ends.stabilising or begins.branches != ends.branches:
-                continue
-            opens, closes = begins.square_root_coefficient, ends.square_root_coefficient
-            if m in found or opens is None or closes is None:
-                continue
-            grows = max(opens, closes) * np.sqrt(abs(ends.mu - begins.mu))
-            if grows <= SPLIT_RELATIVE * 2 * pi * begins.frequency_hz:
+        if begins.stabilising:
+            continue
+        ends = (m for m, o in enumerate(onsets) if o.stabilising and m not in found and _of_one_mode(begins, o))
+        for m in sorted(ends, key=lambda m: abs(onsets[m].mu - begins.mu)):
+            if _stays_within(begins, onsets[m]):
                 found |= {k, m}
                 break
     return found
 
 
-def without_crossings(changes: Sequence[StabilityChange]) -> list[int]:
-    """Places of the changes that are left without modes that cross (`crossings`), found at both branches or at one."""
+def _of_one_mode(one: Onset, other: Onset) -> bool:
+    """Whether two onsets may be of the same mode: by their branches, where numbered, and their frequencies."""
+    numbered = any(one.branches) and any(other.branches)
+    if numbered and not set(one.branches) & set(other.branches):
+        return False
+    return abs(one.frequency_hz - other.frequency_hz) <= ALIKE * max(one.frequency_hz, other.frequency_hz)
+
+
+def _stays_within(begins: Onset, ends: Onset) -> bool:
+    """Whether growth between its beginning and its end is rounding (`within_rounding`)."""
+    size, width = 2 * pi * begins.frequency_hz, ends.mu - begins.mu
+    slopes = [abs(o.growth_slope) for o in (begins, ends) if o.growth_slope is not None]
+    opens = [o.square_root_coefficient for o in (begins, ends) if o.growth_slope is None]
+    roots = [kappa for kappa in opens if kappa is not None]
+    if len(slopes) + len(roots) < 2:
+        return False
+    grows = max(4 / 27 * sum(slopes) * abs(width), *(kappa * np.sqrt(abs(width)) for kappa in roots), 0.0)
+    if not slopes:
+        return bool(grows <= SPLIT_RELATIVE * size)
+    return bool(width >= 0.0 and grows <= UNSTABLE_RELATIVE * size)
+
+
+def beyond_rounding(changes: Sequence[StabilityChange]) -> list[int]:
+    """Places of the changes that are left without those of growth within rounding (`within_rounding`), found at both
+    branches or at one."""
     solved = [c for c in once_each(changes) if c.onset is not None]
     onsets = [c.onset for c in solved if c.onset is not None]
-    gone = [solved[k] for k in crossings(onsets)]
+    gone = [solved[k] for k in within_rounding(onsets)]
     return [k for k, change in enumerate(changes) if not _is_one_of(change, gone)]

@@ -19,7 +19,7 @@ from ..typing import BoolArray, ComplexArray, Sparse
 from .backward_error import BackwardError
 from .coupling import PointCoupling
 from .full.family import Family
-from .histories import Entries, StabilityChange, imbalance, once_each, reported, unexplained, without_crossings
+from .histories import Entries, StabilityChange, beyond_rounding, entering, imbalance, once_each, reported, unexplained
 from .meeting import partner_of
 from .newton import Root, crossing, exceptional, meeting, standstill
 from .onset import AT_ONSET, Branches, Onset, Onsets
@@ -101,7 +101,7 @@ def onsets_by_receptance(
         (StabilityChange(event.mu, _concerned(event), _located(spectrum, family, judge, event, order, has_damping)), k)
         for k, event in _beyond_rounding(events, grown)
     ]
-    passed = [passed[k] for k in without_crossings([change for change, _ in passed])]
+    passed = [passed[k] for k in beyond_rounding([change for change, _ in passed])]
     changes = [change for change, _ in passed]
     return Onsets(
         tuple(reported(changes, entries, (low, high), max_frequency_hz, _begun(start, has_damping, top))),
@@ -111,6 +111,7 @@ def onsets_by_receptance(
         open_contacts,
         at_start=_growing(np.concatenate([start.roots, spectrum.fixed]), top),
         at_end=_growing(np.concatenate([end.roots, spectrum.fixed]), top),
+        entering=entering(_growing_branches(start), changes, entries, low),
         unexplained=unexplained(
             end.branch[_inside(end.roots, top)].tolist(),
             start.branch[_inside(start.roots, np.inf)].tolist(),
@@ -184,6 +185,12 @@ def _begun(state: RootState, has_damping: bool, top: float) -> set[int]:
     rounding = UNSTABLE_RELATIVE if has_damping else SPLIT_RELATIVE
     scale = np.where(state.roots.imag == 0.0, top, np.abs(state.roots))
     return set(state.branch[state.roots.real > rounding * scale].tolist())
+
+
+def _growing_branches(state: RootState) -> dict[int, complex]:
+    """λ of the branches that grow at one μ, by number, twins in the lower half plane left out."""
+    inside = _inside(state.roots, np.inf)
+    return dict(zip(state.branch[inside].tolist(), state.roots[inside].tolist(), strict=True))
 
 
 def _inside(roots: ComplexArray, top: float) -> BoolArray:

@@ -249,7 +249,9 @@ class Whole(Along):
             value = self.family.low + mu
             problem, top = self.family.at(value), self._reach * self.frequency / (2 * np.pi)
             region = Region.band(0.0, top, above=-self._decay * self.frequency)
-            found = find_modes(problem, region, left=True, solver=self.family.options.solver, count=False)
+            # Of what may be a motion as a whole the matrices hold rounding alone; none of it is followed or counted.
+            still = self.family.rest_limit(self.frequency)
+            found = find_modes(problem, region, left=True, solver=self.family.options.solver, count=False, still=still)
             assert found.left is not None, "asked for"
             change = self.family.slopes(value)
             with np.errstate(all="ignore"):

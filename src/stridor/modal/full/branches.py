@@ -16,7 +16,7 @@ import numpy as np
 from ...typing import ComplexArray
 from ..at_rest import moving
 from ..dense_problem import eigenvalues
-from ..histories import crossings
+from ..histories import StabilityChange, entering, next_end, within_rounding
 from ..krylov.exceptional import exceptional_point
 from ..krylov.follow import BranchState
 from ..krylov.passages import Passage
@@ -91,14 +91,17 @@ def solved(
         opened = _opened(source, way.low)
         found = _opening(source, ends[0], way.low, top)
     began = {branch - 1 - source.at_rest for f in found for branch in f.onset.branches}
-    found += [_begins(source, way, branch, o.root, top) for branch, o in opened.items() if o.root is not None]
+    found += [_begins(source, branch, o.root) for branch, o in opened.items() if o.root is not None]
+    # Beyond the band only what may come into it is solved, with where that ends.
+    changes = [StabilityChange(f.onset.mu, (f.branch,), f.onset) for f in found]
     balance, lost, led = 0, list[Passage](), set[int]()
     for passage in way.passages:
         if family.low + passage.high <= between[0]:
             continue
-        enters = None if passage.stabilising else way.entries.after(_concerned(passage), passage.low, np.inf)
-        if _is_above(passage, CLEARLY * top) and enters is None:
-            balance += (-1 if passage.stabilising else 1) * (1 if passage.kind == "divergence" else 2)
+        above, concerned = _is_above(passage, CLEARLY * top), _concerned(passage)
+        matters = way.entries.after(concerned, family.low + passage.low) is not None
+        if above and not matters:
+            balance += _roots(passage)
             continue
         if passage.low <= OPENING * (family.high - family.low) and {passage.branch, passage.partner} & began:
             continue
@@ -108,21 +111,27 @@ def solved(
             continue
         root = located(source, passage)
         if root is None:
-            lost.append(passage)
+            if above and passage.stabilising:
+                balance += _roots(passage)
+            else:
+                lost.append(passage)
             continue
         if told is not None and root[0].mu - family.low <= told.until:
             continue  # what it does before is rounding
         one = BranchOnset(_onset(source, passage, *root), passage.branch)
-        if enters is not None and abs(root[0].lam.imag) > top:
-            entry = min(max(family.low + enters, one.onset.mu), between[1])
-            one = replace(one, onset=replace(one.onset, enters_at=entry))
         if not any(_same(one.onset, other.onset, family) for other in found):
             found.append(one)
-    crossed = crossings([f.onset for f in found])
-    found = [f for k, f in enumerate(found) if k not in crossed]
-    inside = (f.onset for f in found if between[0] <= f.onset.mu <= between[1])
-    said = sum(o.roots for o in inside)
-    balance += said
+            changes.append(StabilityChange(one.onset.mu, concerned, one.onset))
+    rounding = within_rounding([f.onset for f in found])
+    found = [f for k, f in enumerate(found) if k not in rounding]
+    changes = [c for k, c in enumerate(changes) if k not in rounding]
+    found = [_entering(one, change, changes, way) for one, change in zip(found, changes, strict=True)]
+    grow = np.flatnonzero(unstable(family, way.low.values, top)).tolist()
+    grows = {b: complex(way.low.values[b]) for b in grow}
+    way = replace(way, entering=entering(grows, changes, way.entries, between[0]))
+    inside = [f.onset for f in found if between[0] <= f.onset.mu <= between[1]]
+    balance += sum(o.roots for o in inside)
+    said = sum(o.roots for o in inside if o.enters_at is not None or 2 * np.pi * o.frequency_hz <= CLEARLY * top)
     explained = _explained(lost)
     growing = [growing_roots(state.values[unstable(family, state.values, top)]) for state in (way.low, way.high)]
     fast = _throughout(family, (way.low, way.high), ends, top)
@@ -131,6 +140,22 @@ def solved(
     )
     agree = agree and _across_known(family, way, ends, top, said)
     return found, way, agree and explained and growing[1] - growing[0] == balance
+
+
+def _entering(
+    one: BranchOnset, change: StabilityChange, changes: list[StabilityChange], way: Followed
+) -> BranchOnset:  # fmt: skip
+    """The onset with where its growth comes into the band, if it begins above it and does not end before."""
+    onset = one.onset
+    if onset.stabilising or 2 * np.pi * onset.frequency_hz <= way.entries.top:
+        return one
+    enters = way.entries.after(change.branches, onset.mu, next_end(changes, change.branches, onset.mu))
+    return replace(one, onset=replace(onset, enters_at=enters))
+
+
+def _roots(passage: Passage) -> int:
+    """By how many more roots grow beyond a passage."""
+    return (-1 if passage.stabilising else 1) * (1 if passage.kind == "divergence" else 2)
 
 
 def _across_known(
@@ -259,17 +284,13 @@ def _told(opened: dict[int, Opening], passage: Passage, near: float) -> Opening 
     return one if abs(old.values[passage.branch] - one.at(old.mu)) <= near else None
 
 
-def _begins(source: Along, way: Followed, branch: int, root: Root, top: float) -> BranchOnset:
+def _begins(source: Along, branch: int, root: Root) -> BranchOnset:
     """An onset at the low end, or so near it that its growth is not seen there."""
     onset = Onset(
         mu=root.mu, frequency_hz=root.lam.imag / (2 * np.pi), kind="flutter", damped=source.family.dissipates,
         stabilising=False, branches=_numbers(source, branch, branch), residual=root.residual,
         square_root_coefficient=None, growth_slope=root.slope,
     )  # fmt: skip
-    t = root.mu - source.family.low
-    enters = way.entries.after((branch,), t, np.inf) if root.lam.imag > top else None
-    if enters is not None:
-        onset = replace(onset, enters_at=source.family.low + max(enters, t))
     return BranchOnset(onset, branch)
 
 

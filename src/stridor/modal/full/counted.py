@@ -17,6 +17,7 @@ from scipy.optimize import linear_sum_assignment
 
 from ...typing import BoolArray, ComplexArray
 from ..dense_problem import Eigenpairs
+from ..histories import within_rounding
 from ..newton import Root, crossing, meeting, standstill
 from ..onset import Onset
 from ..quadratic.polish import pairs
@@ -193,7 +194,9 @@ class _Search:
                         passing.append(found)
                     elif not any(self._same(found, other) for other in onsets):
                         onsets.append(found)
-        return Counted(tuple((self.start + c.t, self._number(c)) for c in grid), tuple(onsets), tuple(passing))
+        rounding = within_rounding(onsets)
+        told = tuple(o for k, o in enumerate(onsets) if k not in rounding)
+        return Counted(tuple((self.start + c.t, self._number(c)) for c in grid), told, tuple(passing))
 
     def _number(self, count: _Count) -> int:
         """How many roots grow, without those that open further on."""

@@ -23,9 +23,9 @@ SMALLEST = 1.01e-9  # step at which the follower goes on whatever it sees
 
 @dataclass(frozen=True)
 class Followed:
-    """Branches over the range: states at both ends of what was asked for, passages, entries into the band (over
-    t = μ − low), μ where they were unsure, and steps (μ, μ) within which slopes foretell that growth begins or ends:
-    what does both in one leaves nothing at its ends."""
+    """Branches over the range: states at both ends of what was asked for, passages (over t = μ − low), entries into the
+    band, and λ and μ of branches that grow above it at the low end and come in; μ where they were unsure, and steps
+    (μ, μ) within which slopes foretell that growth begins or ends: what does both in one leaves nothing at its ends."""
 
     source: Along
     low: BranchState
@@ -34,6 +34,7 @@ class Followed:
     entries: Entries
     unsure: tuple[float, ...]
     foretold: tuple[tuple[float, float], ...]
+    entering: tuple[tuple[complex, float], ...] = ()
 
 
 def follower(
@@ -90,7 +91,7 @@ def followed(source: Along, low: float, high: float, top: float, finer: int = 1)
 
     def watch(old: BranchState, new: BranchState) -> None:
         passages.extend(meetings(source, old, new) if family.reversible else crossings(old, new))
-        entries.watch((old.mu, new.mu), old.values, new.values, range(len(old.index)))
+        entries.watch((family.low + old.mu, family.low + new.mu), old.values, new.values, range(len(old.index)))
         sides = ((old.found, new.mu - old.mu), (new.found, old.mu - new.mu))
         if any(changes_within(family, found, step, top) for found, step in sides):
             foretold.append((family.low + old.mu, family.low + new.mu))

@@ -76,7 +76,7 @@ def full_onsets(
     make = [lambda: source(BEYOND), lambda: source(WIDER)] if unfollowed is None else []
     answer = search(family, make, (low, high), ends, top, unfollowed or "")
     said = sentence(family, answer, ends, top, "μ", float)
-    return replace(result, onsets=answer.onsets, completeness=said)
+    return replace(result, onsets=answer.onsets, entering=answer.entering, completeness=said)
 
 
 def _checked(source: Along, ends: tuple[RegionModes, RegionModes], top: float) -> Along:

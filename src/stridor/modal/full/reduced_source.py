@@ -78,7 +78,7 @@ def reduced_onsets(
     at_start, at_end = (tuple(end.values[unstable(family, end.values, top)].tolist()) for end in ends)
     return Onsets(
         answer.onsets, (low, high), max_frequency_hz, family.dissipates, family.open_contacts, at_start=at_start,
-        at_end=at_end, contact_state=family.contacts.contact_state,
+        at_end=at_end, entering=answer.entering, contact_state=family.contacts.contact_state,
         unexplained=0 if answer.vouched else max(len(answer.lacks), 1),
     )  # fmt: skip
 

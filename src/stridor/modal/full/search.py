@@ -14,6 +14,7 @@ import numpy as np
 
 from ...errors import AnalysisError
 from ..at_rest import more_slow, moving
+from ..histories import within_rounding
 from ..onset import Onset
 from ..quadratic import RegionModes
 from .axis import walked
@@ -44,7 +45,8 @@ class Answer:
     onsets differ. why: what kept branches from being followed, if anything did. walked: at how many ω the imaginary
     axis was looked at, where that led to the onsets (`axis`). values: at how many μ the onsets of followed branches
     were held against a count. slow [1/s]: up to which |λ| modes at the ends cannot be told from motions as a whole,
-    where there are more of them than such motions.
+    where there are more of them than such motions. entering: λ of branches that grow above the band at the low end, and
+    the μ at which they come into it.
     """
 
     onsets: tuple[Onset, ...]
@@ -56,6 +58,7 @@ class Answer:
     walked: int = 0
     values: int = 0
     slow: float = 0.0
+    entering: tuple[tuple[complex, float], ...] = ()
 
     @property
     def vouched(self) -> bool:
@@ -69,9 +72,10 @@ class Answer:
 
     @property
     def unplaced(self) -> tuple[Passing, ...]:
-        """Those that come into the band, none having left it before, whose growth no onset that is listed begins."""
+        """Those that come into the band, none having left it before, whose growth no onset that is listed begins and
+        which do not grow from the low end on."""
         came: list[Passing] = []
-        left, listed = 0, sum(o.enters_at is not None for o in self.onsets)
+        left, listed = 0, sum(o.enters_at is not None for o in self.onsets) + len(self.entering)
         for one in self.passing:
             if one.roots > 0 and not left:
                 came.append(one)
@@ -109,7 +113,7 @@ def _searched(
             # Where every step is a full solve, a count costs less than finer steps.
             for finer in (1, FINER)[number > 0 : 1 if source.whole else 2]:
                 found, way, complete = solved(source, between, ends, top, finer)
-                best = Answer(_wanted(found, between, top), complete, way)
+                best = Answer(_wanted(found, between, top), complete, way, entering=way.entering)
                 if complete:
                     break
         except AnalysisError as error:
@@ -219,7 +223,9 @@ def _walked(
     walk = walked(family, between, top, ends[0].values)
     if walk is None:
         return None
-    onsets = tuple(sorted((as_onset(family, root) for root in walk.roots), key=_order))
+    every = sorted((as_onset(family, root) for root in walk.roots), key=_order)
+    rounding = within_rounding(every)
+    onsets = tuple(o for k, o in enumerate(every) if k not in rounding)
     number = _number_by(family, top)
     grid = tuple((mu, number(mu)) for mu in _sampled(onsets, between))
     seen = Counted(grid, onsets, ())
@@ -262,7 +268,7 @@ def _counted_answer(
 ) -> Answer:
     """The list of onsets that what was counted bears out: of branches, of the count, or of both."""
     followed = () if best is None else best.onsets
-    entering = tuple(o for o in followed if not _in_band(o, top))
+    beyond_band = tuple(o for o in followed if not _in_band(o, top))
     inside = tuple(o for o in followed if _in_band(o, top))
     width = seen.grid[-1][0] - seen.grid[0][0]
     both = (*inside, *(o for o in seen.onsets if not any(_same(o, other, width, top) for other in inside)))
@@ -273,8 +279,11 @@ def _counted_answer(
         onsets = seen.onsets
     lacks = seen.lacking(onsets)
     agree = _ends_agree(family, seen, ends, top)
-    every = tuple(sorted((*onsets, *entering), key=_order))
-    answer = Answer(every, not lacks and agree, way, seen, tuple(lacks), why, values=len(seen.grid))
+    every = tuple(sorted((*onsets, *beyond_band), key=_order))
+    grown = () if best is None else best.entering
+    answer = Answer(
+        every, not lacks and agree, way, seen, tuple(lacks), why, values=len(seen.grid), entering=grown
+    )
     return replace(answer, complete=answer.complete and not answer.unplaced)
 
 

@@ -16,7 +16,7 @@ from ...stages import passing, stage
 from ...system import System
 from ...threads import one_thread
 from ...typing import BoolArray, ComplexArray, IntArray
-from ..histories import Entries, StabilityChange, reported, unbalanced, unexplained
+from ..histories import Entries, StabilityChange, beyond_rounding, entering, reported, unbalanced, unexplained
 from ..onset import Onset, Onsets
 from ..options import Options
 from ..quadratic.reach import searched
@@ -93,7 +93,7 @@ def krylov_onsets(
         stage(f"onset {len(changes) + 1}, solved in the full problem")
         concerned = (passage.branch, passage.partner) if passage.kind == "meeting" else (passage.branch,)
         # What begins beyond the band counts where it comes into it, unless it ends before.
-        matters = way.entries.after(concerned, passage.low, np.inf) is not None
+        matters = way.entries.after(concerned, passage.low) is not None
         if _is_above(passage, top * CLEARLY_ABOVE) and not matters:
             changes.append(StabilityChange(passage.low, concerned, None, _lost(passage, top)))
             continue
@@ -102,6 +102,7 @@ def krylov_onsets(
         onset = _located(telling if passage.kind == "crossing" else reduced, passage, (0.0, high), limit)
         lost = _lost(passage, top) if onset is None else (0, 0)
         changes.append(StabilityChange(passage.low, concerned, onset, lost))
+    changes = [changes[k] for k in beyond_rounding(changes)]
     return Onsets(
         tuple(reported(changes, way.entries, (low, high), max_frequency_hz, way.from_start)),
         (low, high),
@@ -110,7 +111,7 @@ def krylov_onsets(
         problem.open_contacts,
         at_start=tuple(way.start.values[_inside(telling, way.start, top)].tolist()),
         at_end=tuple(way.end.values[_inside(telling, way.end, top)].tolist()),
-        entering=_entering(way, changes, low),
+        entering=entering({b: complex(way.start.values[b]) for b in way.from_start}, changes, way.entries, low),
         contact_state=problem.contact_state,
         unexplained=unexplained(np.flatnonzero(_inside(telling, way.end, top)), way.from_start, changes),
         unbalanced=unbalanced(
@@ -129,18 +130,6 @@ def _count_of_samples(low: float, high: float) -> int:
 def _numbered(state: BranchState) -> tuple[IntArray, ComplexArray]:
     """Numbers and eigenvalues (b,) of the branches at one μ."""
     return np.arange(1, len(state.index) + 1), state.values
-
-
-def _entering(way: _Way, changes: list[StabilityChange], low: float) -> tuple[tuple[complex, float], ...]:
-    """λ of branches that grow above the band where the range begins, and the μ at which they come into it growing."""
-    found: list[tuple[complex, float]] = []
-    for branch in way.from_start:
-        lam = complex(way.start.values[branch])
-        ends = (c.onset.mu for c in changes if c.onset is not None and c.onset.stabilising and branch in c.branches)
-        mu = way.entries.after((branch,), low, min(ends, default=np.inf))
-        if lam.imag > way.entries.top and mu is not None:
-            found.append((lam, mu))
-    return tuple(found)
 
 
 def _growing(reduced: Reduced, state: BranchState, top: float) -> BoolArray:

@@ -24,7 +24,9 @@ from .region import BORDER, MARGIN, PAD, Disc, Region, cells, remaining, uncover
 from .search import BLOCK, DiscModes, Search, TooClose
 
 WHOLE = 600  # freedoms up to which all eigenvalues are found at once where a few discs do not do
-CROWDED = 1e-8  # backward error that does for what lies as dense as overdamped modes do about −1/α₂
+# Backward error that does for what lies as dense as overdamped modes do about −1/α₂, or as a mode that passes zero does
+# beside a motion as a whole.
+CROWDED = 1e-8
 FEW_SHIFTS = 4  # discs after which they do not
 DENSE = 60  # freedoms up to which all eigenvalues are found at once
 COUNTED = 1500  # and up to which the argument principle counts them unasked: it takes about a hundred determinants
@@ -101,7 +103,11 @@ def find_modes(
     run.counting = problem.size <= COUNTED if count is None else count
     if problem.size <= DENSE:
         sides, evidence = run.dense(endless=not math.isfinite(region.re_max))
-        values, right, y = run.chosen(sides)
+        try:
+            values, right, y = run.chosen(sides)
+        except UnsettledError:
+            run.tolerance = max(tolerance, CROWDED)
+            values, right, y = run.chosen(sides)
     else:
         try:
             sides, evidence = run.sparse()
