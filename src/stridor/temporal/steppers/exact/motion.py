@@ -11,7 +11,7 @@ from ....errors import AnalysisError
 from ....typing import Array, ComplexArray, IntArray
 from ...columns import FRICTION, NORMAL, SUPPORT, WORKS
 from ..basis import Basis
-from .decisions import CLOSE, EventState, Impact, Touching, choices, consistent_status, impact, landing
+from .decisions import CLOSE, ROUNDING, EventState, Impact, Touching, choices, consistent_status, impact, landing
 from .drive import Piece
 from .leap import MOMENT, PLAIN, STRETCH
 from .search import CROSSED, UNDECIDED, Numbers, Parts, first_root, numbers_of, parts_of, planes
@@ -128,8 +128,7 @@ class Motion:
 
     def support_speeds(self) -> tuple[Array, Array]:
         """What moving supports add to the velocities (m,) along normals and tangents now."""
-        piece = self.pieces[self.piece]
-        speed = piece.displacements @ piece.derivative @ piece.powers(self.time)
+        speed, _ = self.pieces[self.piece].speeds(self.time)
         return self.pairs.normal_lift @ speed, self.pairs.tangent_lift @ speed
 
     # -- from one event to the next ----------------------------------------------------------------------------------
@@ -268,8 +267,7 @@ class Motion:
 
     def _strike(self, struck: Impact, met: list[int], slips: Mapping[int, float] | None = None) -> None:
         """Go on behind an impact."""
-        piece = self.pieces[self.piece]
-        speed = piece.displacements @ piece.derivative @ piece.powers(self.time)
+        speed, _ = self.pieces[self.piece].speeds(self.time)
         self.works[SUPPORT] += float(speed @ (self.pairs.inertia @ (struck.velocity - self.v)))
         self.v = struck.velocity
         self.works[NORMAL] += struck.normal_work
@@ -320,9 +318,8 @@ class Motion:
         self._sizes = np.abs(self.q), np.abs(self.v)
         while self.piece and self.time < self.pieces[self.piece].start:
             self.piece -= 1
-        piece = self.pieces[self.piece]
-        speed = piece.displacements @ piece.derivative @ piece.powers(self.time)
-        self._jump(speed, speed / ratio)
+        speed, terms = self.pieces[self.piece].speeds(self.time)
+        self._jump(speed, speed / ratio, ROUNDING * terms)
 
     def _change_piece(self) -> None:
         """Other loads and other speeds of the supports from here on."""
@@ -333,15 +330,14 @@ class Motion:
             self.next = (np.inf, "end", 0)
             self.anchor = None
             return
-        new = self.pieces[self.piece]
-        self._jump(
-            new.displacements @ new.derivative @ new.powers(self.time),
-            old.displacements @ old.derivative @ old.powers(self.time),
-        )
+        speed, terms = self.pieces[self.piece].speeds(self.time)
+        before, others = old.speeds(self.time)
+        self._jump(speed, before, ROUNDING * (terms + others))
 
-    def _jump(self, speed: Array, before: Array) -> None:
-        """Loads are others from here on, and supports have another speed (p,) than before."""
-        jump = speed - before
+    def _jump(self, speed: Array, before: Array, rounding: Array) -> None:
+        """Loads are others from here on, and supports have another speed (p,) than before; up to ``rounding`` (p,) they
+        have the same: polynomials that meet at the end of a ramp are sums of terms that cancel there."""
+        jump = np.where(np.abs(speed - before) > rounding, speed - before, 0.0)
         closed = [c for c, now in enumerate(self.status) if now != GAP]
         if not np.any(jump):
             touching = {c: choices(self.pairs, c, sense(self.status[c]), self.status[c]) for c in closed}
