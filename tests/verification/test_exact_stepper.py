@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import stridor as st
-from marching import block_on_belt, in_chunks, points_of, run, touch
+from marching import belt_motion, block_on_belt, in_chunks, points_of, run, touch
 from mode_coupling import mode_coupling
 from random_contacts import random_system
 from stridor.case import template_text
@@ -83,6 +83,27 @@ def test_slip_that_stops_is_held_up_to_the_stick_limit():
     later = result.time > math.pi
     assert result.displacement[later, 0, 0] == pytest.approx(-0.35, abs=1e-12)
     assert np.all(result.status[later, 0] == STICK)
+
+
+@pytest.mark.parametrize(("speed", "ramp"), [(0.256, 2.54), (0.25, 2.6), (0.3, 2.2), (0.33, 2.27), (0.4, 2.4)])
+def test_what_sticks_at_the_end_of_a_ramp_sticks_on(speed: float, ramp: float):
+    """k = N = 1, μs 0.6, μk 0.3: at the end of the ramp the belt has gone v T/2, between both, and from there on it goes
+    with v until it has gone 0.6. Polynomials that meet there are the same but for rounding, which strikes nothing."""
+    system = block_on_belt(law=StaticKinetic(0.3, 0.6), speed=1.0)
+    phases = [PhaseSpec("press", 1.0, {"press": 1.0}, {"belt": 0.0}, 0.5),
+              PhaseSpec("slide", 6.0, {"press": 1.0}, {"belt": speed}, ramp)]  # fmt: skip
+    settings = Settings(record_every=1, watch=("block",), step=0.01, stepper="exact")
+    result = simulate(system, phases, settings)
+    assert 0.3 < 0.5 * speed * ramp < 0.6
+    let_go = 1.0 + ramp + (0.6 - 0.5 * speed * ramp) / speed
+    slips = np.flatnonzero((result.status[:, 0] == SLIP) & (result.time > 1.0))
+    assert result.time[slips[0]] == pytest.approx(let_go, abs=0.011)
+    assert np.abs(result.tangential_force).max() > 0.59
+    assert np.all(result.status[result.time > 1.0, 0] != OPEN)
+    sticks = (result.time > 1.0 + ramp) & (result.time < let_go)
+    wanted = 0.5 * speed * ramp + speed * (result.time[sticks] - 1.0 - ramp)
+    assert result.displacement[sticks, 0, 0] == pytest.approx(wanted, abs=1e-12)
+    assert energy_balance(result).error < CLOSED
 
 
 def test_two_masses():
@@ -449,6 +470,132 @@ def test_a_mass_that_two_walls_hold():
     still = corner(**WALL, **{"contacts.wall": wall, "contacts.rub.stiffness": "rigid", "phases.slide.duration": 2.0})
     found = st.simulate(still.with_({"contacts.rub.friction.coefficient": 0.0}))
     assert found.normal_force[-1] == pytest.approx([1.0, 1.0], abs=1e-12)
+
+
+GUIDED = """
+units = "nondimensional"
+bodies.m = { type = "mass", mass = 1.0, position = [0.0, 0.0] }
+bodies.belt = { type = "obstacle", shape = "flat", point = [0, 0], normal = [0, 1], sliding.velocity = [1.0, 0.0] }
+springs.y = { between = ["m", "ground"], direction = [0.0, 1.0], stiffness = 0.5, damping = 0.2 }
+supports.guide = { at = "m", fixed = ["x"] }
+loads.press = { at = "m", force = [0.0, -1.0] }
+contacts.rub = { slave = "m", master = "belt", stiffness = "rigid", friction = { law = "coulomb", coefficient = 0.3 } }
+temporal = { step = 0.02, record_every = 1, stepper = "auto", watch = ["m"], initial = "rest" }
+modal.max_frequency_hz = 1.0
+phases = [
+    { name = "press", duration = 4.0, ramp = 2.0, velocities.belt = 0.0 },
+    { name = "slide", duration = 4.0, ramp = 2.0, velocities.belt = 1.0 },
+    { name = "back", duration = 6.0, ramp = 3.0, velocities.belt = -1.0 },
+    { name = "stop", duration = 4.0, ramp = 2.0, velocities.belt = 0.0 },
+]
+"""
+AWAY = 0.6875  # ∫|1 − 2b| over a ramp b from one speed to its opposite
+
+
+def goes_with_the_law(result: st.Trajectory, friction: Sequence[float]) -> None:
+    """What slips is held back by all of its friction, and nothing else slips."""
+    later = result.time[:, None] > 1.0
+    rests = np.abs(result.slip_speed) < 1e-9
+    slips = later & (result.status == SLIP) & ~rests
+    wanted = -np.array(friction) * result.normal_force * np.sign(result.slip_speed)
+    size = np.abs(result.normal_force).max()
+    assert result.tangential_force[slips] == pytest.approx(wanted[slips], abs=1e-9 * size)
+    assert np.count_nonzero(later & (result.status == SLIP) & rests) < 10  # where ramps begin and end
+    assert np.all(rests[result.status == STICK])
+    assert energy_balance(result).error < CLOSED
+
+
+@pytest.mark.parametrize("plain", [Leaps.plain, 0])
+@pytest.mark.parametrize("stiffness", ["rigid", 10.0])
+def test_friction_of_slip_that_supports_hold_turns_with_it(
+    stiffness: float | str, plain: int, monkeypatch: pytest.MonkeyPatch
+):
+    """A guided pin, rigid on its belt: friction takes μN times the way of the belt (closed form). It sticks while the
+    belt stands."""
+    monkeypatch.setattr(Leaps, "plain", plain)
+    result = st.simulate(st.loads(GUIDED).with_({"contacts.rub.stiffness": stiffness}))
+    assert result.path == "exact"
+    goes_with_the_law(result, [0.3])
+    way = 1.0 + 2.0 + 3.0 * AWAY + 3.0 + 1.0
+    if stiffness == "rigid":
+        assert result.works["friction"][-1] == pytest.approx(0.3 * way, rel=1e-12)
+    other = st.simulate(st.loads(GUIDED).with_({"contacts.rub.stiffness": stiffness, "temporal.stepper": "implicit"}))
+    assert result.works["friction"] == pytest.approx(other.works["friction"], abs=1e-3)
+    assert np.count_nonzero(result.status != other.status) < 6  # where ramps begin and end
+    slides = np.abs(other.slip_speed) > 0.05
+    assert result.tangential_force[slides] == pytest.approx(other.tangential_force[slides], abs=2e-3)
+    assert result.tangential_force[-1] == pytest.approx(0.3 * -result.normal_force[-1])  # it keeps what it had
+    shares = [(p.contacts["rub"].stick_fraction, p.contacts["rub"].slip_fraction) for p in result.phases]
+    assert np.array(shares) == pytest.approx(np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0], [0.5, 0.5]]), abs=1e-9)
+
+
+@pytest.mark.parametrize("plain", [Leaps.plain, 0])
+@pytest.mark.parametrize("wall", ["rigid", 20.0])
+def test_a_mass_in_a_corner_of_two_belts(wall: float | str, plain: int, monkeypatch: pytest.MonkeyPatch):
+    """Rigid, each contact holds the slip over the other: forces follow the senses of both (closed form)."""
+    monkeypatch.setattr(Leaps, "plain", plain)
+    speeds = [(0.0, 0.0), (1.0, 0.0), (1.0, -1.0), (-1.0, 0.5), (0.0, 0.0)]
+    changes = {
+        "bodies.wall": {
+            "type": "obstacle", "shape": "flat", "point": (0, 0), "normal": (-1, 0), "sliding": {"velocity": (0, 1.0)}
+        },
+        "springs.x": {"between": ("m", "ground"), "direction": (1, 0), "stiffness": 0.7, "damping": 0.2},
+        "loads.press.force": (2, -3),
+        "contacts.side": {
+            "slave": "m", "master": "wall", "stiffness": wall, "friction": {"law": "coulomb", "coefficient": 0.2}
+        },
+        "phases": [
+            {"name": f"p{i}", "duration": 4.0, "ramp": 2.0, "velocities": {"belt": belt, "wall": side}}
+            for i, (belt, side) in enumerate(speeds)
+        ],
+    }  # fmt: skip
+    free = "\n".join(line for line in GUIDED.splitlines() if not line.startswith("supports"))
+    case = st.loads(free).with_(changes)
+    result = st.simulate(case)
+    assert result.path == "exact"
+    goes_with_the_law(result, [0.3, 0.2])
+    ends = np.searchsorted(result.time, np.arange(4.0, 20.5, 4.0) - 0.1)
+    if wall == "rigid":
+        for end, (belt, side) in zip(ends, speeds, strict=True):
+            # T₁ = 0.3 N₁ sign along x and T₂ = 0.2 N₂ sign along y, in balance with N₁, N₂ and the load (2, −3); what
+            # comes to rest keeps its friction.
+            last = (belt, side) if end < ends[-1] else speeds[-2]
+            balance = [[-0.3 * np.sign(last[0]), 1.0], [1.0, 0.2 * np.sign(last[1])]]
+            assert result.normal_force[end] == pytest.approx(np.linalg.solve(balance, [2.0, 3.0]), rel=1e-9), (belt, side)
+            assert result.status[end].tolist() == [SLIP if belt else STICK, SLIP if side else STICK]
+        assert np.abs(result.displacement).max() < 1e-12
+    other = st.simulate(case.with_({"temporal.stepper": "implicit", "temporal.step": 0.005, "temporal.record_every": 4}))
+    assert result.normal_force[ends[2:]] == pytest.approx(other.normal_force[ends[2:]], abs=1e-2)
+    assert result.works["friction"][-1] == pytest.approx(other.works["friction"][-1], rel=1e-3)
+
+
+@pytest.mark.parametrize("plain", [Leaps.plain, 0])
+def test_friction_of_slip_that_another_contact_holds_by_sticking(plain: int, monkeypatch: pytest.MonkeyPatch):
+    """A block between two belts: it goes with the one that is pressed harder, and the other drags at it, both ways."""
+    monkeypatch.setattr(Leaps, "plain", plain)
+    contacts = tuple(
+        touch(row, [1.0, 0.0, 0.0], slip=-speed, law=Coulomb(0.3), motions=1, name=name)
+        for row, speed, name in (([0.0, 1.0, 0.0], 1.0, "A"), ([0.0, 0.0, 1.0], -0.1, "B"))
+    )
+    points = {k: replace(r, lift=np.zeros((2, 1))) for k, r in points_of(3, block=0).items()}
+    system = System(
+        np.eye(3), np.zeros((3, 3)), np.diag([1e-3, 0.0, 0.0]), contacts, {"press": np.array([0.0, -1.0, -5.0])},
+        belt_motion(3), points,
+    )  # fmt: skip
+    phases = [
+        PhaseSpec(f"p{i}", 4.0, {"press": 1.0}, {"belt": speed}, 2.0) for i, speed in enumerate((0.0, 1.0, -1.0, 0.0))
+    ]
+    results = [
+        simulate(system, phases, Settings(record_every=1, watch=("block",), step=0.02, stepper=name))
+        for name in ("exact", "implicit")
+    ]
+    goes_with_the_law(results[0], [0.3, 0.3])
+    exactly, other = results
+    assert np.all(exactly.status[1:, 1] == STICK)
+    assert exactly.displacement == pytest.approx(other.displacement, abs=1e-4)
+    slides = np.abs(other.slip_speed[:, 0]) > 1e-3
+    assert exactly.tangential_force[slides] == pytest.approx(other.tangential_force[slides], abs=2e-3)
+    assert exactly.works["friction"][-1] == pytest.approx(0.3 * 1.1 * (1.0 + 2.0 + 2.0 * AWAY + 2.0 + 1.0), rel=1e-12)
 
 
 LIMIT = """

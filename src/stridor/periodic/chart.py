@@ -7,19 +7,20 @@ from functools import cached_property
 
 import numpy as np
 
-from ..temporal.steppers.exact.statuses import STICK, Driven, Status
+from ..temporal.steppers.exact.statuses import Driven, Status
 from ..typing import Array
 from .problem import SlidingProblem
 
 
 @dataclass(frozen=True)
 class Chart:
-    """ξ = (scaled displacements, velocities (y,) each, places of contacts that stick) of a status, s numbers in all.
+    """ξ = (scaled displacements, velocities (y,) each, places of contacts ``stuck`` by a force) of a status: s numbers.
 
     The same for every friction coefficient, as what a status holds does not depend on it.
     """
 
     status: Status
+    stuck: tuple[int, ...]
     z: Array
     scale: Array
     lifted: Array
@@ -37,14 +38,14 @@ class Chart:
         z, _, scale = regime.free
         terms = problem.piece.terms
         lifted = regime.back @ driven.holds
-        stuck = [c for c, now in enumerate(status) if now == STICK]
+        stuck = [c for c, what in regime.held if what == "tangent"]
         along = np.concatenate([np.arange(1), terms + np.array(stuck, dtype=int)])
         rows = problem.pairs.tangent[stuck]
         squares = np.abs(problem.basis.stiffness)
         soft = np.maximum(squares, 1e-6 * squares.max(initial=0.0) or 1.0)
         weights = 1.0 / np.sqrt(np.maximum((rows * rows / soft).sum(axis=1), 1e-300))
         return Chart(
-            status, z, scale, lifted[:, along], (lifted @ driven.rate)[:, along], rows,
+            status, tuple(stuck), z, scale, lifted[:, along], (lifted @ driven.rate)[:, along], rows,
             problem.pairs.tangent_lift[stuck] @ problem.piece.displacements[:, 0], weights,
         )  # fmt: skip
 
@@ -84,9 +85,8 @@ class Chart:
         dq, dv = np.zeros((len(self.z), self.size)), np.zeros((len(self.z), self.size))
         dq[:, :size] = self.z / self.scale
         dv[:, size : 2 * size] = self.z
-        own = [c for c, now in enumerate(self.status) if now == STICK]
         for j in range(stuck):
             dq[:, 2 * size + j] = self.lifted[:, 1 + j] / self.weights[j]
             dv[:, 2 * size + j] = self.lifted_rate[:, 1 + j] / self.weights[j]
-            places[own[j], 2 * size + j] = 1.0 / self.weights[j]
+            places[self.stuck[j], 2 * size + j] = 1.0 / self.weights[j]
         return dq, dv, places

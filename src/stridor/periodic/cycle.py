@@ -14,6 +14,7 @@ from ..typing import Array, ComplexArray, IntArray
 
 NEUTRAL = {"shooting": 1e-6, "harmonic": 1e-2}  # a largest multiplier as close to one as this decides nothing
 OWN = 1e-2  # the motion's own multiplier, by harmonic balance further from one: the others tell nothing
+SHORT = ("sticks", "slips", "reversals of slip")  # what harmonics do not tell where it is short
 TURNING = 0.15  # the same of harmonic balance where slip turns or sticks, whose multipliers converge slowly
 OPEN, STICK, SLIP = 0, 1, 2  # as in histories of runs
 
@@ -127,9 +128,23 @@ class Cycle(Shown):
 
     @property
     def untold_share(self) -> float | None:
-        """Sticks, and slips beside them, that are shorter than this share of the period are not told, so that a share
-        of stick of 0 may be one of them: 1/h of h harmonics; None by shooting, which tells all."""
+        """Sticks, slips beside them and slips amid slip the other way that are shorter than this share of the period
+        are not told, so that a share of stick or slip of 0 may be one of them: 1/h of h harmonics; None by shooting,
+        which tells all."""
         return 1.0 / self.harmonics if self.method == "harmonic" and self.harmonics else None
+
+    @property
+    def untold(self) -> tuple[str, ...]:
+        """What contacts may do besides, but too shortly to be told: one without a stick may stick, one that sticks
+        without a slip may slip, and one that does both may slip the other way in between; () by shooting."""
+        if not self.untold_share:
+            return ()
+        turning = self._turning()
+        found = {
+            SHORT[0] if stick == 0.0 else SHORT[1] if slip == 0.0 else "" if turning[k] else SHORT[2]
+            for k, (_, stick, slip) in enumerate(self.shares)
+        }
+        return tuple(kind for kind in SHORT if kind in found)
 
     @property
     def frequency_hz(self) -> float:
@@ -197,15 +212,16 @@ class Cycle(Shown):
         found = ["slip"] if np.any(self.shares[:, 2] > 0.0) else []
         if np.any(self.shares[:, 1] > 0.0):
             found.append("stick")
-        if self._turns():
+        if any(self._turning()):
             found.append("reversal")
         if np.any((self.shares[:, 0] > 0.0) & (self.shares[:, 0] < 1.0)):
             found.append("separation")
         return tuple(found)
 
-    def _turns(self) -> bool:
+    def _turning(self) -> list[bool]:
+        """Of each contact whether it slips both ways."""
         ways = [{c.behind[k] for c in self.changes} for k in range(len(self.contact_names))]
-        return any({2, 3} <= met for met in ways)
+        return [{2, 3} <= met for met in ways]
 
     @property
     def word(self) -> tuple[tuple[str, str], ...]:

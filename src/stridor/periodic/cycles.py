@@ -13,7 +13,7 @@ from ..notebook import counted, html_table
 from ..tabular import Cell, Rows, Tabular, dataset
 from ..typing import Array
 from .branch import Bifurcation, CycleBranch
-from .cycle import NEUTRAL, Change, Cycle
+from .cycle import NEUTRAL, SHORT, Change, Cycle
 from .parting import Unclosed
 
 SCHEMA = "stridor.cycles/1"
@@ -95,11 +95,14 @@ class Cycles(Tabular):
 
     @property
     def _untold(self) -> str:
-        """Which sticks may be there though no stick is listed; "" of shooting, and where all contacts stick."""
-        shares = [c.untold_share for c in self.cycles if c.untold_share and not np.all(c.shares[:, 1] > 0.0)]
-        if not shares:
+        """What may be there though it is not listed; "" of shooting, and where all contacts do all of it."""
+        found = [(c.untold_share, kind) for c in self.cycles if c.untold_share for kind in c.untold]
+        if not found:
             return ""
-        return f"; sticks shorter than about {100 * max(shares):.2g} % of a period are not told (harmonic balance)"
+        kinds = [kind for kind in SHORT if any(kind == other for _, other in found)]
+        said = " and ".join(filter(None, [", ".join(kinds[:-1]), kinds[-1]]))
+        longest = max(share for share, _ in found)
+        return f"; {said} shorter than about {100 * longest:.2g} % of a period are not told (harmonic balance)"
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -44,7 +44,8 @@ def sampled(closed: ClosedShot, reached_from: str) -> Cycle:
     while True:
         end = motion.reach(closed.period)
         assert motion.anchor is not None
-        now = np.array([{GAP: OPEN, STUCK: STICK}.get(s, SLIP) for s in motion.status], dtype=np.int64)
+        told = motion.anchor.watched.flow.told
+        now = np.array([{GAP: OPEN, STUCK: STICK}.get(s, SLIP) for s in told], dtype=np.int64)
         parts.append(_Part(motion.anchor, begun, end, now))
         contacts, watch = _at(outputs, motion.anchor, _often(motion.anchor, begun, end, closed.period))
         low, high = extremes(contacts)

@@ -10,10 +10,9 @@ import numpy as np
 
 from ....errors import AnalysisError
 from ....typing import Array
-from .statuses import BACKWARD, FORWARD, GAP, STICK, Driven, Pairs, Status, sense
+from .statuses import BACKWARD, FORWARD, GAP, ROUNDING, STICK, Driven, Pairs, Status, sense, spans
 
 CLOSE = 1e-9  # of the forces at hand: how far off a condition rounding may be
-ROUNDING = 1e-12  # of the terms of a force
 MOST = 4**6  # combinations that are tried
 
 
@@ -48,7 +47,7 @@ def impact(pairs: Pairs, velocity: Array, speeds: tuple[Array, Array], met: Sequ
     options: list[list[int]] = []
     for c in met:
         ahead = [FORWARD, BACKWARD] if slip[c] > 0.0 else [BACKWARD, FORWARD]
-        stuck = [STICK] if pairs.sticking[c] > 0.0 and _along(pairs, c) else []
+        stuck = [STICK] if pairs.sticking[c] > 0.0 else []
         options.append([*stuck, *ahead, GAP])
     size = max([abs(n) for n in normal.values()] + [abs(s) for s in slip.values()] + [1e-300])
     for combination in itertools.islice(itertools.product(*options), MOST):
@@ -67,7 +66,7 @@ def impact(pairs: Pairs, velocity: Array, speeds: tuple[Array, Array], met: Sequ
             lost_friction -= 0.5 * along[i] * (slip[c] + behind[1])
             carried += pushed[i] * speeds[0][c] + along[i] * speeds[1][c]
         slips = {c: sense(now) for c, now in zip(met, combination, strict=True) if now != GAP}
-        held, pushing = _rows(pairs, combination, met)
+        held, pushing, _ = _rows(pairs, combination, met)
         return Impact(after, slips, lost_normal, lost_friction, carried, held, pushing)
     raise AnalysisError("friction jams the contacts in an impact: no impulses bring them to rest against one another")
 
@@ -94,26 +93,24 @@ def landing(
     )  # fmt: skip
 
 
-def _along(pairs: Pairs, c: int) -> bool:
-    """Whether a contact can be stopped along its tangent at all, beside along its normal."""
-    n, t = pairs.normal[c], pairs.tangent[c]
-    nn, tt, nt = float(n @ n), float(t @ t), float(n @ t)
-    return nn * tt - nt * nt > 1e-13 * nn * tt and tt > 0.0
-
-
-def _rows(pairs: Pairs, combination: Sequence[int], met: Sequence[int]) -> tuple[Array, Array]:
-    """What one combination holds, and along which rows it pushes: (r, k) each."""
+def _rows(pairs: Pairs, combination: Sequence[int], met: Sequence[int]) -> tuple[Array, Array, list[int]]:
+    """What one combination holds, and along which rows it pushes: (r, k) each; which contacts of it stick without an
+    impulse, as normals hold their slip."""
     none = np.zeros((0, pairs.normal.shape[1]))
     rows, directions = [none], [none]
+    normals = pairs.normal[[c for c, now in zip(met, combination, strict=True) if now != GAP]]
+    fast: list[int] = []
     for c, now in zip(met, combination, strict=True):
         if now == GAP:
             continue
         rows.append(pairs.normal[c][None])
         directions.append((pairs.normal[c] - sense(now) * pairs.sliding[c] * pairs.tangent[c])[None])
-        if now == STICK:
+        if now == STICK and pairs.holdable[c] and spans(normals, pairs.tangent[c]):
+            fast.append(c)
+        elif now == STICK:
             rows.append(pairs.tangent[c][None])
             directions.append(pairs.tangent[c][None])
-    return np.vstack(rows), np.vstack(directions)
+    return np.vstack(rows), np.vstack(directions), fast
 
 
 def _impulses(
@@ -126,12 +123,12 @@ def _impulses(
     size: float,
 ) -> tuple[Array, Array] | None:
     """Impulses (c,), (c,) along normals and tangents of one combination, None where they break its conditions."""
-    rows, directions = _rows(pairs, combination, met)
+    rows, directions, fast = _rows(pairs, combination, met)
     wanted: list[float] = []
     for c, now in zip(met, combination, strict=True):
         if now != GAP:
             wanted.append(-normal[c])
-        if now == STICK:
+        if now == STICK and c not in fast:
             wanted.append(-slip[c])
     try:
         solved = np.linalg.solve(rows @ directions.T, np.array(wanted))
@@ -150,6 +147,11 @@ def _impulses(
         weight = float(pairs.normal[c] @ pairs.normal[c])
         if pushed[i] * weight < -CLOSE * size:
             return None
+        if c in fast:
+            at += 1
+            if abs(behind[1]) > CLOSE * size:
+                return None
+            continue
         if now == STICK:
             along[i] = solved[at + 1]
             at += 2
@@ -166,8 +168,9 @@ def _impulses(
 
 @dataclass(frozen=True)
 class EventState:
-    """Displacement q, velocity v (k,) and p (P,), and what the terms of q and v amount to."""
+    """Displacement q, velocity v (k,) and p (P,) at a time, and what the terms of q and v amount to."""
 
+    time: float
     q: Array
     v: Array
     p: Array
@@ -188,7 +191,7 @@ def choices(pairs: Pairs, c: int, slip: float, now: int) -> Touching:
     if slip != 0.0:
         options = [FORWARD if slip > 0.0 else BACKWARD, GAP]
     else:
-        stuck = [STICK] if pairs.sticking[c] > 0.0 and _along(pairs, c) else []
+        stuck = [STICK] if pairs.sticking[c] > 0.0 else []
         options = [*stuck, FORWARD, BACKWARD, GAP]
     if now in options:
         options.remove(now)
@@ -247,7 +250,12 @@ def _consistent(driven: Driven, touching: Mapping[int, Touching], state: EventSt
             continue
         if normal < -CLOSE * size:
             return False
-        if now == STICK:
+        if driven.ways[c, 0]:
+            # Slip that is held goes as what holds it: at rest friction is what it was.
+            way = driven.way(c, state.time)
+            if way != 0.0 if now == STICK else sense(now) * way < 0.0:
+                return False
+        elif now == STICK:
             # A slip that comes to its end stays there up to the stick limit, as the law has it.
             if abs(tangential) > pairs.sticking[c] * normal + CLOSE * size:
                 return False

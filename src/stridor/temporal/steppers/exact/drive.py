@@ -44,6 +44,11 @@ class Piece:
         steps = np.arange(1, self.terms) / self.unit
         return np.diag(steps, -1)
 
+    def speeds(self, time: float) -> tuple[Array, Array]:
+        """Speeds (p,) [m/s] of the supports at a time, and the sums of what their terms amount to."""
+        rates, powers = self.displacements @ self.derivative, self.powers(time)
+        return rates @ powers, np.abs(rates) @ np.abs(powers)
+
 
 def pieces(schedule: Schedule) -> list[Piece]:
     """A phase is one piece, or two where it begins with a ramp."""

@@ -14,10 +14,10 @@ from ....kernels import njit, put
 from ....typing import Array, IntArray
 from ...arithmetic import FAST
 from ...columns import FRICTION, NORMAL, SUPPORT
-from .decisions import CLOSE, MOST, ROUNDING
-from .statuses import BACKWARD, FORWARD, GAP, STICK
+from .decisions import CLOSE, MOST
+from .statuses import BACKWARD, FORWARD, GAP, NEAR, ROUNDING, STICK
 from .sums import dot
-from .tables import FORCES, GAPS, JAMMED, OPENING_RATE, OPENINGS, SLIP_RATE, matrix
+from .tables import FORCES, GAPS, JAMMED, OPENING_RATE, OPENINGS, SLIP_RATE, WAYS, matrix
 
 CLOSES, OPENS, SLIPS_FORWARD, SLIPS_BACKWARD, STOPS = range(5)
 MEANING = {
@@ -28,9 +28,10 @@ DONE, LEFT, NO_OPTION = range(3)  # gone through; left to `Motion.passed`; an op
 
 class Bench(NamedTuple):
     """What does not change with the status: rows (m, k) of normals and tangents with their lifts (m, p), products of
-    them (m, 3) nn, tt, nt, compliance, friction coefficients (m,), whether a contact can stop along its tangent at all,
-    inertia (p, k) of supports; polynomials of σ (p, T) of their displacements and (p, T) speeds [m/s], when the piece
-    of the schedule begins and what σ counts in [s]."""
+    them (m, 3) nn, tt, nt, compliance, friction coefficients (m,), whether a contact stops along its tangent by a force
+    of its own, beside that along its normal, and whether others could hold its slip, inertia (p, k) of supports;
+    polynomials of σ (p, T) of their displacements and (p, T) speeds [m/s], when the piece of the schedule begins and
+    what σ counts in [s]."""
 
     normal: Array
     tangent: Array
@@ -41,6 +42,7 @@ class Bench(NamedTuple):
     sliding: Array
     sticking: Array
     stops: Array
+    holdable: Array
     inertia: Array
     places: Array
     speeds: Array
@@ -63,6 +65,16 @@ def _sense(now: int) -> float:  # pragma: no cover - compiled
 
 
 @njit(cache=True)
+def _way(ways: Array, c: int, time: float) -> float:  # pragma: no cover - compiled
+    """The sign of a slip that is held, from a time [s] on."""
+    way = ways[c, 1]
+    for i in range(2, ways.shape[1]):
+        if ways[c, i] <= time:
+            way = -way
+    return way
+
+
+@njit(cache=True)
 def _choices(bench: Bench, c: int, slip: float, now: int, options: Array) -> int:  # pragma: no cover - compiled
     """What a touching contact may do, what it does now first; how many."""
     count = 0
@@ -70,7 +82,7 @@ def _choices(bench: Bench, c: int, slip: float, now: int, options: Array) -> int
         options[0], options[1] = FORWARD if slip > 0.0 else BACKWARD, GAP
         count = 2
     else:
-        if bench.sticking[c] > 0.0 and bench.stops[c] > 0.0:
+        if bench.sticking[c] > 0.0:
             options[0] = STICK
             count = 1
         options[count], options[count + 1], options[count + 2] = FORWARD, BACKWARD, GAP
@@ -94,11 +106,12 @@ def _size_on(row: Array, sizes: Array) -> float:  # pragma: no cover - compiled
 
 @njit(cache=True)
 def _consistent(
-    store: Array, where: IntArray, bench: Bench, status: IntArray, touching: IntArray, slips: Array, whole: Array,
-    sizes: Array,
+    store: Array, where: IntArray, bench: Bench, time: float, status: IntArray, touching: IntArray, slips: Array,
+    whole: Array, sizes: Array,
 ) -> bool:  # fmt: skip # pragma: no cover - compiled
     """Whether forces and accelerations of a status go with it, of contacts ``touching`` with their slips."""
     m = status.shape[0]
+    ways = matrix(store, where, WAYS)
     forces = matrix(store, where, FORCES)
     values = np.empty(2 * m)
     rounding, size = 0.0, 1e-300
@@ -123,6 +136,14 @@ def _consistent(
                 return False
         elif normal < -CLOSE * size:
             return False
+        elif ways[c, 0] != 0.0:
+            # Slip that is held goes as what holds it: at rest friction is what it was.
+            way = _way(ways, c, time + NEAR * bench.length)
+            if now == STICK:
+                if way != 0.0:
+                    return False
+            elif _sense(now) * way < 0.0:
+                return False
         elif now == STICK:
             # A slip that comes to its end stays there up to the stick limit, as the law has it.
             if abs(tangential) > bench.sticking[c] * normal + CLOSE * size:
@@ -136,8 +157,8 @@ def _consistent(
 
 @njit(cache=True)
 def _decide(
-    store: Array, options_at: IntArray, known: IntArray, bench: Bench, touching: IntArray, counts: IntArray,
-    options: IntArray, slips: Array, whole: Array, sizes: Array, status: IntArray,
+    store: Array, options_at: IntArray, known: IntArray, bench: Bench, time: float, touching: IntArray,
+    counts: IntArray, options: IntArray, slips: Array, whole: Array, sizes: Array, status: IntArray,
 ) -> tuple[int, int]:  # fmt: skip # pragma: no cover - compiled
     """The first status that goes with its forces, written to ``status`` (m,); whether there is one, and the number of
     one that would have to be known."""
@@ -154,7 +175,7 @@ def _decide(
         if place != JAMMED:
             if place < 0:
                 return NO_OPTION, code
-            if _consistent(store, options_at[place], bench, status, touching, slips, whole, sizes):
+            if _consistent(store, options_at[place], bench, time, status, touching, slips, whole, sizes):
                 return DONE, code
         i = n - 1
         while i >= 0:
@@ -176,7 +197,11 @@ def _impact(
     behind; sticks: the friction coefficient up to which it does. False where friction jams it."""
     nn, tt, nt = bench.products[c, 0], bench.products[c, 1], bench.products[c, 2]
     size = max(abs(normal), abs(slip), 1e-300)
-    if bench.sticking[c] > 0.0 and bench.stops[c] > 0.0:
+    if bench.sticking[c] > 0.0 and bench.stops[c] == 0.0:
+        pushed = -normal / nn
+        if pushed * nn >= -CLOSE * size and abs(slip + nt * pushed) <= CLOSE * size:
+            return True, pushed, 0.0, 0.0
+    elif bench.sticking[c] > 0.0:
         whole = nn * tt - nt * nt
         pushed, along = (-normal * tt + slip * nt) / whole, (-slip * nn + normal * nt) / whole
         if pushed * nn >= -CLOSE * size and abs(along) <= sticks * pushed + CLOSE * size / nn:
@@ -210,7 +235,12 @@ def go_through(
     v = moving[k:]
     slips, touching = np.zeros(m), np.empty(m, dtype=np.int64)
     options, counts = np.zeros((m, 4), dtype=np.int64), np.zeros(m, dtype=np.int64)
-    count = 0
+    count, code = 0, 0
+    for other in range(m):
+        code = 4 * code + status[other]
+    if known[code] < 0:
+        return NO_OPTION, code
+    ways = matrix(store, options_at[known[code]], WAYS)
     strikes = meaning == CLOSES and bench.compliance[c] == 0.0
     pushed = along = normal = slip = sense = 0.0
     if meaning == CLOSES:
@@ -231,7 +261,8 @@ def go_through(
                 touching[count] = c
                 count += 1
             continue
-        slips[other] = _sense(status[other])
+        held = ways[other, 0] != 0.0
+        slips[other] = _way(ways, other, time + NEAR * bench.length) if held else _sense(status[other])
         if strikes:
             # A spring takes no impulse, so what slides or sticks on one is carried along by what strikes elsewhere.
             own = dot(bench.tangent_lift[other], along_supports)
@@ -239,7 +270,7 @@ def go_through(
             amount = abs(own)
             for i in range(k):
                 amount += abs(bench.tangent[other, i] * v[i])
-            still = abs(there) <= CLOSE * amount and status[other] == STICK
+            still = abs(there) <= CLOSE * amount and (status[other] == STICK or bench.holdable[other] > 0.0)
             slips[other] = 0.0 if still else there
         counts[other] = _choices(bench, other, slips[other], status[other], options[other])
         touching[count] = other
@@ -248,8 +279,14 @@ def go_through(
         slips[c] = sense
         counts[c] = _choices(bench, c, sense, GAP, options[c])
     elif meaning == CLOSES:
-        slips[c] = slip
-        options[c, 0], counts[c] = FORWARD if slip >= 0.0 else BACKWARD, 1
+        amount = abs(dot(bench.tangent_lift[c], along_supports))
+        for i in range(k):
+            amount += abs(bench.tangent[c, i] * v[i])
+        if bench.holdable[c] > 0.0 and abs(slip) <= CLOSE * amount:
+            counts[c] = _choices(bench, c, 0.0, STICK, options[c]) - 1  # all but the last, that it stays open
+        else:
+            slips[c] = slip
+            options[c, 0], counts[c] = FORWARD if slip >= 0.0 else BACKWARD, 1
     elif meaning in (SLIPS_FORWARD, SLIPS_BACKWARD):
         ahead = meaning == SLIPS_FORWARD
         options[c, 0], options[c, 1], options[c, 2] = (
@@ -257,7 +294,7 @@ def go_through(
         )  # fmt: skip
         counts[c] = 3
     elif meaning == STOPS:
-        if bench.sticking[c] > 0.0 and bench.stops[c] > 0.0:
+        if bench.sticking[c] > 0.0:
             options[c, 0] = STICK
             counts[c] = 1
         back = BACKWARD if status[c] == FORWARD else FORWARD
@@ -275,7 +312,7 @@ def go_through(
         amounts[2 * k + i] = abs(whole[2 * k + i])
     after = np.empty(m, dtype=np.int64)
     found, code = _decide(
-        store, options_at, known, bench, touching[:count], counts, options, slips, whole, amounts, after
+        store, options_at, known, bench, time, touching[:count], counts, options, slips, whole, amounts, after
     )
     if found != DONE:
         if strikes:

@@ -17,7 +17,7 @@ from .events import DONE, LEFT, Bench, go_through, powers
 from .forms import FORMS
 from .observed import Course, Records, extremes, record
 from .search import CROSSED, UNDECIDED, Numbers, Parts, first_root
-from .statuses import GAP, STICK, TAYLOR
+from .statuses import GAP, NEAR, STICK, TAYLOR
 from .sums import followed, forms_at, modes_at, product, slow_at
 from .tables import (
     AMOUNTS,
@@ -38,9 +38,11 @@ from .tables import (
     SLOW,
     STATE,
     STATE_SLOW,
+    TOLD,
     TURN_IMAG,
     TURN_REAL,
     TURNED,
+    TURNS,
     matrix,
 )
 
@@ -113,9 +115,10 @@ def _begin(
 
 @njit(cache=True)
 def _look(
-    store: Array, where: IntArray, state: LeapState, zeta: Array, terms: Array, ahead: Array
+    store: Array, where: IntArray, state: LeapState, unit: float, zeta: Array, terms: Array, ahead: Array
 ) -> bool:  # pragma: no cover - compiled
-    """Find what comes next; whether that can be told. Where it is a change of contact, modes there are ``ahead``."""
+    """Find what comes next; whether that can be told. Where it is a change of contact, modes there are ``ahead``; unit
+    [s]: that of the piece."""
     times, counts = state.times, state.counts
     rows, parts = matrix(store, where, NUMBER_SLOW), matrix(store, where, NUMBER_AMOUNTS)
     slow, amounts = np.zeros((rows.shape[0], terms.shape[0])), np.zeros(rows.shape[0])
@@ -131,7 +134,11 @@ def _look(
         matrix(store, where, LONGEST)[0, 0], matrix(store, where, TURN_REAL), matrix(store, where, TURN_IMAG),
         matrix(store, where, BENT), matrix(store, where, TURNED),
     )  # fmt: skip
-    limit = min(times[SPAN], times[PIECE_END] - times[NOW])
+    turns, turn, turning = matrix(store, where, TURNS), np.inf, -1
+    for i in range(turns.shape[0]):
+        if times[NOW] + NEAR * unit < turns[i, 0] < turn:
+            turn, turning = turns[i, 0], int(turns[i, 1])
+    limit = min(min(times[SPAN], times[PIECE_END] - times[NOW]), turn - times[NOW])
     code, which, after, level, _, unsure = first_root(
         numbers, matrix(store, where, POLES), zeta, table, limit, counts[LEVEL], ahead
     )
@@ -142,6 +149,9 @@ def _look(
     if code == CROSSED:
         counts[NEXT_KIND], counts[NEXT_NUMBER] = CONTACT, which
         times[NEXT] = min(times[NOW] + after, times[PIECE_END])
+    elif limit == turn - times[NOW]:
+        counts[NEXT_KIND], counts[NEXT_NUMBER], times[NEXT] = CONTACT, turning, turn
+        modes_at(zeta, matrix(store, where, POLES), limit, ahead)
     elif times[NOW] + limit >= times[PIECE_END] * (1 - 1e-15):
         counts[NEXT_KIND], times[NEXT] = PIECE, times[PIECE_END]
     else:
@@ -150,11 +160,11 @@ def _look(
 
 
 @njit(cache=True)
-def _count(state: LeapState, time: float, step: float) -> None:  # pragma: no cover - compiled
-    """Time spent in the present statuses, in steps."""
+def _count(state: LeapState, told: IntArray, time: float, step: float) -> None:  # pragma: no cover - compiled
+    """Time spent in the present statuses, as they are told (m,), in steps."""
     share = max(time - state.times[COUNTED], 0.0) / step
     for c in range(state.status.shape[0]):
-        now, kept = state.status[c], state.statistics[c]
+        now, kept = told[c], state.statistics[c]
         kept[OPEN_STEPS if now == GAP else STICK_STEPS if now == STICK else SLIP_STEPS] += share
         if now in (GAP, STICK) and share > 0.0:
             first = FIRST_OPEN if now == GAP else FIRST_STICK
@@ -191,7 +201,7 @@ def leap(
             zeta, terms, span = _begin(store, where, state, bench)
             times[SPAN] = span
             ahead = np.empty(2 * zeta.shape[1])
-            if not _look(store, where, state, zeta, terms, ahead):
+            if not _look(store, where, state, bench.length, zeta, terms, ahead):
                 return NO_TELLING, zeta, terms, ahead
         f, (j, s) = zeta.shape[1], terms.shape
         stop = min(times[NEXT], end)
@@ -201,6 +211,9 @@ def leap(
         put(modes[:f], zeta[0])
         put(modes[f:], zeta[1])
         forms_at(store, where, zeta, modes, 0.0, along_real, along_imag, alone, WORKS, first)
+        told = np.empty(m, dtype=np.int64)
+        for c in range(m):
+            told[c] = int(matrix(store, where, TOLD)[0, c])
         course = Course(zeta, terms, along_real, along_imag, alone, first, times[NOW])
         # Records on the way, those that fall on a change with the status before it only where rounding has them so.
         begins = counts[NEXT_RECORD]
@@ -208,7 +221,7 @@ def leap(
         ends = max(min(ends, begins + records.contacts.shape[0] - counts[RECORDED]), begins)
         if ends > begins:
             record(
-                store, where, course, status_now, works, between, (begins, ends), counts[RECORDED], records,
+                store, where, course, told, works, between, (begins, ends), counts[RECORDED], records,
                 statistics,
             )  # fmt: skip
             counts[NEXT_RECORD] = ends
@@ -221,7 +234,7 @@ def leap(
             store, where, course, status_now, (max(times[COUNTED], times[NOW]), stop), modes, counts[PEAK_LEVEL],
             bench.sliding, statistics,
         )  # fmt: skip
-        _count(state, stop, step)
+        _count(state, told, stop, step)
         forms_at(store, where, zeta, modes, stop - times[NOW], along_real, along_imag, alone, WORKS, forms)
         for w in range(WORKS):
             works_now[w] = works[w] + forms[w] - first[w]

@@ -43,7 +43,7 @@ from .motion import UNTOLD, Anchor, Motion, Watched
 from .observed import Records
 from .outputs import Outputs
 from .search import planes
-from .statuses import Status
+from .statuses import Status, spans
 from .tables import JAMMED, LEG, OPTION, UNKNOWN, Store, leg_parts, option_parts
 
 
@@ -178,6 +178,7 @@ class Leaps:
         return leg_parts(
             watched.flow, watched.numbers, watched.slow, watched.slow_sizes, meanings, watched.table,
             forms_of(watched.flow), observed.modes, observed.slow, self.every * self.step,
+            np.array(watched.turns, dtype=float).reshape(-1, 2),
         )  # fmt: skip
 
 
@@ -192,7 +193,7 @@ def _bench(motion: Motion) -> Bench:
         np.einsum("ck,ck->c", a, b)
         for a, b in ((pairs.normal, pairs.normal), (pairs.tangent, pairs.tangent), (pairs.normal, pairs.tangent))
     )
-    stops = (nn * tt - nt * nt > 1e-13 * nn * tt) & (tt > 0.0)
+    stops = [not spans(n[None], t) for n, t in zip(pairs.normal, pairs.tangent, strict=True)]
 
     def plain(values: Array) -> Array:
         return np.ascontiguousarray(values, dtype=float)
@@ -201,6 +202,7 @@ def _bench(motion: Motion) -> Bench:
         normal=plain(pairs.normal), tangent=plain(pairs.tangent), normal_lift=plain(pairs.normal_lift),
         tangent_lift=plain(pairs.tangent_lift), products=np.stack([nn, tt, nt], axis=1),
         compliance=plain(pairs.compliance), sliding=plain(pairs.sliding), sticking=plain(pairs.sticking),
-        stops=plain(stops), inertia=plain(pairs.inertia), places=plain(piece.displacements),
+        stops=plain(np.array(stops)), holdable=plain(np.array(pairs.holdable)),
+        inertia=plain(pairs.inertia), places=plain(piece.displacements),
         speeds=plain(piece.displacements @ piece.derivative), begin=piece.start, length=piece.unit,
     )  # fmt: skip

@@ -15,14 +15,28 @@ from .decisions import CLOSE, EventState, Impact, Touching, choices, consistent_
 from .drive import Piece
 from .leap import MOMENT, PLAIN, STRETCH
 from .search import CROSSED, UNDECIDED, Numbers, Parts, first_root, numbers_of, parts_of, planes
-from .statuses import BACKWARD, FORWARD, GAP, STICK, TAYLOR, Driven, Flow, Pairs, Regime, Row, Status, sense
+from .statuses import (
+    BACKWARD,
+    FORWARD,
+    GAP,
+    NEAR,
+    ROUNDING,
+    STICK,
+    TAYLOR,
+    Driven,
+    Flow,
+    Pairs,
+    Regime,
+    Row,
+    Status,
+    sense,
+)
 
 UNTOLD = (
     "a force, gap or slip of a contact stays so close to zero that no change of status can be told from rounding, "
     'which the exact stepper does not pass; take stepper = "explicit"'
 )
 BEYOND = "the motion is no longer finite: it grows beyond all numbers, and what contacts do then cannot be told"
-HELD = 1e-9  # of a row: what is left of it where contacts leave it no motion
 STORM = 300  # so many events within a `MOMENT`: they accumulate
 # Contacts that throw one another off: behind so many events of a moment, throws shorter than this [rad] end at once.
 LANDINGS = ((PLAIN, 1e-4), (100, 1e-2))
@@ -31,7 +45,8 @@ LANDINGS = ((PLAIN, 1e-4), (100, 1e-2))
 @dataclass(frozen=True)
 class Watched:
     """A flow with the numbers that end it: for each what it means and of which contact, its weights on what is slow and
-    what these are the sums of (m, S), by which rounding is judged; tables of the search."""
+    what these are the sums of (m, S), by which rounding is judged; tables of the search. turns: when
+    [s] slip that is held comes to its end, and which meaning that has, behind those of the numbers."""
 
     flow: Flow
     meanings: tuple[tuple[str, int], ...]
@@ -40,6 +55,12 @@ class Watched:
     slow: Array
     slow_sizes: Array
     table: Parts
+    turns: tuple[tuple[float, int], ...]
+
+    def turn(self, time: float) -> tuple[float, int]:
+        """The first of the turns behind a time."""
+        near = NEAR * self.flow.piece.unit
+        return next((turn for turn in self.turns if turn[0] > time + near), (np.inf, -1))
 
 
 @dataclass(frozen=True)
@@ -124,12 +145,11 @@ class Motion:
         return np.concatenate([self.pieces[self.piece].powers(time), self.holds])
 
     def _state(self) -> EventState:
-        return EventState(self.q, self.v, self.drive(self.time), *self._sizes)
+        return EventState(self.time, self.q, self.v, self.drive(self.time), *self._sizes)
 
     def support_speeds(self) -> tuple[Array, Array]:
         """What moving supports add to the velocities (m,) along normals and tangents now."""
-        piece = self.pieces[self.piece]
-        speed = piece.displacements @ piece.derivative @ piece.powers(self.time)
+        speed, _ = self.pieces[self.piece].speeds(self.time)
         return self.pairs.normal_lift @ speed, self.pairs.tangent_lift @ speed
 
     # -- from one event to the next ----------------------------------------------------------------------------------
@@ -139,7 +159,8 @@ class Motion:
         while self.next is None:
             anchor = self._anchored()
             last = self.pieces[self.piece].end
-            limit = min(anchor.span, last - anchor.time)
+            turn, turning = anchor.watched.turn(anchor.time)
+            limit = min(anchor.span, last - anchor.time, turn - anchor.time)
             code, which, after, level, _, unsure = first_root(
                 anchor.watched.numbers._replace(
                     rows=anchor.watched.slow @ anchor.terms.T,
@@ -155,6 +176,8 @@ class Motion:
                 raise AnalysisError(UNTOLD if finite else BEYOND)
             if code == CROSSED:
                 self.next = (min(anchor.time + after, last), *anchor.watched.meanings[which])
+            elif limit == turn - anchor.time:
+                self.next = (turn, *anchor.watched.meanings[turning])
             elif anchor.time + limit >= last * (1 - 1e-15):
                 self.next = (last, "piece", 0)
             else:
@@ -244,8 +267,11 @@ class Motion:
             if pairs.compliance[c] == 0.0:
                 self._collide([c, *(o for o in touching if pairs.compliance[o] == 0.0)])
                 return
-            speed = float(pairs.tangent[c] @ self.v + self.support_speeds()[1][c])
-            touching[c] = Touching(speed, (FORWARD if speed >= 0.0 else BACKWARD,))
+            speed, at_rest = self._slip(c)
+            if at_rest and pairs.holdable[c]:
+                touching[c] = Touching(0.0, tuple(o for o in choices(pairs, c, 0.0, STICK).options if o != GAP))
+            else:
+                touching[c] = Touching(speed, (FORWARD if speed >= 0.0 else BACKWARD,))
         elif meaning == "opens":
             del touching[c]
         elif meaning in ("slips forward", "slips backward"):
@@ -259,7 +285,24 @@ class Motion:
 
     def _touching(self) -> dict[int, Touching]:
         """Contacts that are closed now, and what they may do if something else changes."""
-        return {c: choices(self.pairs, c, sense(now), now) for c, now in enumerate(self.status) if now != GAP}
+        return {c: self._going_on(c, now) for c, now in enumerate(self.status) if now != GAP}
+
+    def _slip(self, c: int, slip: float | None = None) -> tuple[float, bool]:
+        """The slip of a contact now [m/s], if it is not told, and whether that is rounding."""
+        parts = np.append(self.pairs.tangent[c] * self.v, self.support_speeds()[1][c])
+        slip = float(parts.sum()) if slip is None else slip
+        return slip, abs(slip) <= CLOSE * float(np.abs(parts).sum())
+
+    def _going_on(self, c: int, now: int) -> Touching:
+        """What a contact may do that is closed, by the slip that its status gives it."""
+        slip = sense(now)
+        if self.pairs.holdable[c]:
+            try:
+                driven = self.driven(self.status)
+            except AnalysisError:  # it was taken up with other contacts closed
+                return choices(self.pairs, c, slip, now)
+            slip = driven.way(c, self.time) if driven.ways[c, 0] else slip
+        return choices(self.pairs, c, slip, now)
 
     def _collide(self, met: list[int], slips: Mapping[int, float] | None = None) -> None:
         """An impact of contacts ``met``; slips: those of others that are closed, where they are not what their status
@@ -268,23 +311,20 @@ class Motion:
 
     def _strike(self, struck: Impact, met: list[int], slips: Mapping[int, float] | None = None) -> None:
         """Go on behind an impact."""
-        piece = self.pieces[self.piece]
-        speed = piece.displacements @ piece.derivative @ piece.powers(self.time)
+        speed, _ = self.pieces[self.piece].speeds(self.time)
         self.works[SUPPORT] += float(speed @ (self.pairs.inertia @ (struck.velocity - self.v)))
         self.v = struck.velocity
         self.works[NORMAL] += struck.normal_work
         self.works[FRICTION] += struck.friction_work
         self.works[SUPPORT] -= struck.carried
         touching: dict[int, Touching] = {}
-        along = self.support_speeds()[1]
         for c, now in enumerate(self.status):
             if now == GAP or c in met:
                 continue
             # A spring takes no impulse, so what slides or sticks on one is carried along by what strikes elsewhere.
-            parts = np.append(self.pairs.tangent[c] * self.v, along[c])
-            slip = float(parts.sum()) if slips is None else slips[c]
-            at_rest = abs(slip) <= CLOSE * float(np.abs(parts).sum())
-            touching[c] = choices(self.pairs, c, 0.0 if at_rest and now == STICK else slip, now)
+            slip, at_rest = self._slip(c, None if slips is None else slips[c])
+            stays = at_rest and (now == STICK or self.pairs.holdable[c])
+            touching[c] = choices(self.pairs, c, 0.0 if stays else slip, now)
         for c, slip in struck.slips.items():
             touching[c] = choices(self.pairs, c, slip, self.status[c])
         self._take(consistent_status(self.pairs.count, touching, self.driven, self._state()))
@@ -305,24 +345,25 @@ class Motion:
     def start(self, touching: Mapping[int, float]) -> None:
         """Begin with q, v as they are; touching: contacts that are closed, with their slip."""
         self._sizes = np.abs(self.q), np.abs(self.v)
-        self.status = tuple(
-            (FORWARD if touching[c] >= 0.0 else BACKWARD) if c in touching else GAP for c in range(self.pairs.count)
-        )
+        self.status = tuple(self._met(c, touching[c]) if c in touching else GAP for c in range(self.pairs.count))
         self._collide([c for c in touching if self.pairs.compliance[c] == 0.0], touching)
+
+    def _met(self, c: int, slip: float) -> int:
+        """The status from which a contact begins that has this slip."""
+        return STICK if slip == 0.0 and self.pairs.holdable[c] else FORWARD if slip >= 0.0 else BACKWARD
 
     def take_up(self, ratio: Array, touching: Mapping[int, float]) -> None:
         """Go on with q, v at ``time`` in another model; ratio (p,): how many times as fast supports are as before;
         touching: contacts that are closed in it, with their slip."""
         self.status = tuple(
-            (GAP if c not in touching else now if now != GAP else (FORWARD if touching[c] >= 0.0 else BACKWARD))
+            (GAP if c not in touching else now if now != GAP else self._met(c, touching[c]))
             for c, now in enumerate(self.status)
         )
         self._sizes = np.abs(self.q), np.abs(self.v)
         while self.piece and self.time < self.pieces[self.piece].start:
             self.piece -= 1
-        piece = self.pieces[self.piece]
-        speed = piece.displacements @ piece.derivative @ piece.powers(self.time)
-        self._jump(speed, speed / ratio)
+        speed, terms = self.pieces[self.piece].speeds(self.time)
+        self._jump(speed, speed / ratio, ROUNDING * terms)
 
     def _change_piece(self) -> None:
         """Other loads and other speeds of the supports from here on."""
@@ -333,19 +374,17 @@ class Motion:
             self.next = (np.inf, "end", 0)
             self.anchor = None
             return
-        new = self.pieces[self.piece]
-        self._jump(
-            new.displacements @ new.derivative @ new.powers(self.time),
-            old.displacements @ old.derivative @ old.powers(self.time),
-        )
+        speed, terms = self.pieces[self.piece].speeds(self.time)
+        before, others = old.speeds(self.time)
+        self._jump(speed, before, ROUNDING * (terms + others))
 
-    def _jump(self, speed: Array, before: Array) -> None:
-        """Loads are others from here on, and supports have another speed (p,) than before."""
-        jump = speed - before
+    def _jump(self, speed: Array, before: Array, rounding: Array) -> None:
+        """Loads are others from here on, and supports have another speed (p,) than before; up to ``rounding`` (p,) they
+        have the same: polynomials that meet at the end of a ramp are sums of terms that cancel there."""
+        jump = np.where(np.abs(speed - before) > rounding, speed - before, 0.0)
         closed = [c for c, now in enumerate(self.status) if now != GAP]
         if not np.any(jump):
-            touching = {c: choices(self.pairs, c, sense(self.status[c]), self.status[c]) for c in closed}
-            self._take(consistent_status(self.pairs.count, touching, self.driven, self._state()))
+            self._take(consistent_status(self.pairs.count, self._touching(), self.driven, self._state()))
             return
         push = self.pairs.inertia.T @ jump
         self.v = self.v - push
@@ -362,11 +401,14 @@ def _watched(regime: Regime, piece: Piece) -> Watched:
     weights: list[ComplexArray] = []
     slow: list[Array] = []
     sizes: list[Array] = []
+    turns: list[tuple[float, int]] = []
     for c, now in enumerate(regime.status):
         normal, tangential = flow.forces[c]
         rows: list[tuple[str, tuple[Row, ...]]] = []
         if now == GAP:
             rows = [("closes", (flow.gap(c),))]
+        elif now == STICK and regime.follows[c]:
+            rows = [("opens", (normal,))]
         elif now == STICK:
             # What holds a slave back that would go forward acts against the tangent.
             limit = normal.times(pairs.sticking[c])
@@ -375,9 +417,7 @@ def _watched(regime: Regime, piece: Piece) -> Watched:
             slip = flow.slip(c)
             s = sense(now)
             rows = [("opens", (normal,))]
-            # Slip that other contacts hold, or that nothing hangs on, ends with none of these.
-            free = np.linalg.norm(regime.free[0].T @ slip.v) > HELD * np.linalg.norm(slip.v)
-            if free and pairs.sticking[c] > 0.0:
+            if not regime.follows[c] and pairs.sticking[c] > 0.0:
                 rows.append(("stops", (slip.times(s),)))
         for name, parts in rows:
             weight, rest = flow.signal(parts[0] if len(parts) == 1 else parts[0].plus(parts[1]))
@@ -386,10 +426,16 @@ def _watched(regime: Regime, piece: Piece) -> Watched:
             slow.append(rest)
             # Of both: a limit and a force that are equal leave nothing, but their rounding.
             sizes.append(sum((flow.sizes_of(part) for part in parts), np.zeros(len(flow.slow))))
+    count = len(meanings)
+    for c, (_, _, *changes) in enumerate(flow.ways):
+        if regime.status[c] not in (GAP, STICK) and np.isfinite(changes).any():
+            turns += [(float(change), len(meanings)) for change in changes if np.isfinite(change)]
+            meanings.append(("stops", c))
     poles = flow.split.poles
     slowest = float(np.abs(poles).min(initial=np.inf))
     longest = min(1.0 / slowest if np.isfinite(slowest) else np.inf, piece.end - piece.start)
-    stacked = np.array(weights, dtype=complex).reshape(len(meanings), len(poles))
-    rest, amounts = (np.array(lot).reshape(len(meanings), len(flow.slow)) for lot in (slow, sizes))
+    stacked = np.array(weights, dtype=complex).reshape(count, len(poles))
+    rest, amounts = (np.array(lot).reshape(count, len(flow.slow)) for lot in (slow, sizes))
     numbers = numbers_of(stacked, poles, rest)
-    return Watched(flow, tuple(meanings), stacked, numbers, rest, amounts, parts_of(poles, longest))
+    table = parts_of(poles, longest)
+    return Watched(flow, tuple(meanings), stacked, numbers, rest, amounts, table, tuple(sorted(turns)))

@@ -7,15 +7,21 @@ q = Z y + R⁺ r, R Z = 0 and W of D W = 0, WᵀZ = 1 (docs/theory-exact.md, eqs
     ÿ + WᵀCZ ẏ + WᵀKZ y = Wᵀ(F p − R⁺r̈ − C R⁺ṙ − K R⁺r),      λ = (R Dᵀ)⁻¹(r̈ − R(F p − C q̇ − K q)).
 
 p holds the powers of time that loads and supports follow, and where each contact began to stick.
+
+Slip may be held by what others hold: t = ΣₖR_k c_k leaves it no motion of its own, and it is the polynomial
+(t R⁺ṙ + d)(p) of the supports. It then turns where that does. While that is at rest friction is not determined: it
+keeps what it had as slip ended, and where there was no slip before, and normals alone hold it, there is none.
 """
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy.linalg as sl
+import scipy.optimize as so
 
 from ....errors import AnalysisError
 from ....typing import Array, ComplexArray
@@ -27,6 +33,9 @@ Status = tuple[int, ...]
 SLOW = 1e-7  # of the fastest mode: what is slower is one small system, moved on by its Taylor series
 RAMP = 3.0  # rad over a ramp: likewise
 TAYLOR = 24  # terms of that series
+HELD = 1e-9  # of a row: what is left of it where contacts leave it no motion
+ROUNDING = 1e-12  # of the terms of a number
+NEAR = 1e-8  # of a ramp: what turns there has turned
 JAMMED = 1e-9
 DEFECTIVE = 1e4  # condition of a mode by whose square rounding grows: balances then still close to 1e-8
 
@@ -57,6 +66,52 @@ class Pairs:
     def count(self) -> int:
         """How many contacts."""
         return len(self.gap)
+
+    @cached_property
+    def holdable(self) -> tuple[bool, ...]:
+        """Of each contact whether all others, and its own normal, could hold its slip."""
+        rigid, found = self.compliance == 0.0, []
+        for c in range(self.count):
+            others = np.vstack([self.normal[rigid], np.delete(self.tangent, c, axis=0)])
+            rest = self.tangent[c] - others.T @ np.linalg.lstsq(others.T, self.tangent[c], rcond=None)[0]
+            found.append(bool(np.linalg.norm(rest) <= HELD * np.linalg.norm(self.tangent[c])))
+        return tuple(found)
+
+
+def spans(rows: Array, row: Array) -> bool:
+    """Whether a row (k,) is a combination of others (r, k), which are independent."""
+    base = sl.qr(rows.T, mode="economic")[0] if len(rows) else np.zeros((len(row), 0))
+    return bool(np.linalg.norm(row - base @ (base.T @ row)) <= HELD * np.linalg.norm(row))
+
+
+def turns(polynomial: Array, amounts: Array) -> tuple[float, list[float]]:
+    """The sign of a polynomial (T,) right behind 0, which is 0 where all of it is rounding of its ``amounts`` (T,), and
+    where between 0 and 1 it changes."""
+    kept = np.where(np.abs(polynomial) > ROUNDING * amounts, polynomial, 0.0)
+    if not np.any(kept):
+        return 0.0, []
+    order = np.arange(len(kept))
+
+    def value(x: float) -> float:
+        return float(kept @ x**order)
+
+    # What a root of several is split into is as close to zero between them as rounding.
+    inside = np.roots(kept[::-1]).real
+    edges = np.concatenate([[0.0], np.sort(inside[(inside > 0.0) & (inside < 1.0)]), [1.0]])
+    signs: list[tuple[float, float]] = []
+    for low, high in itertools.pairwise(edges):
+        middle = 0.5 * (low + high)
+        there = value(middle)
+        if high - low > NEAR and abs(there) > ROUNDING * float(amounts @ middle**order):
+            signs.append((middle, float(np.sign(there))))
+    if not signs:
+        return 0.0, []
+    found = [
+        float(so.brentq(value, here, there, xtol=1e-15))
+        for (here, now), (there, then) in itertools.pairwise(signs)
+        if now != then
+    ]
+    return signs[0][1], found
 
 
 def sense(status: int) -> float:
@@ -99,6 +154,9 @@ class Regime:
         self.held: list[tuple[int, str]] = []  # what each constraint holds: contact, "normal" or "tangent"
         self.spring = np.zeros((k, k))
         self.pushes: list[tuple[int, Array]] = []  # contacts with springs, and the direction of their force
+        closed = [c for c, now in enumerate(status) if now != GAP]
+        normals = pairs.normal[[c for c in closed if pairs.compliance[c] == 0.0]]
+        self.fast = [c for c in closed if pairs.holdable[c] and spans(normals, pairs.tangent[c])]
         for c, now in enumerate(status):
             if now == GAP:
                 continue
@@ -110,7 +168,7 @@ class Regime:
                 rows.append(pairs.normal[c][None])
                 directions.append(along[None])
                 self.held.append((c, "normal"))
-            if now == STICK:
+            if now == STICK and c not in self.fast:
                 rows.append(pairs.tangent[c][None])
                 directions.append(pairs.tangent[c][None])
                 self.held.append((c, "tangent"))
@@ -128,6 +186,15 @@ class Regime:
         if np.linalg.cond(scaled) > 1 / JAMMED:
             raise AnalysisError("contacts that close together cannot be told apart, or friction jams them")
         return np.linalg.inv(scaled) / np.outer(sizes, sizes)
+
+    @cached_property
+    def follows(self) -> tuple[bool, ...]:
+        """Of each contact whether its slip is held by what others hold, and by its own normal."""
+        pairs = self.pairs
+        return tuple(
+            c in self.fast or (now not in (GAP, STICK) and pairs.holdable[c] and spans(self.rows, pairs.tangent[c]))
+            for c, now in enumerate(self.status)
+        )
 
     @cached_property
     def free(self) -> tuple[Array, Array, Array]:
@@ -277,6 +344,37 @@ class Driven:
         pairs = self.regime.pairs
         return Row(np.zeros_like(pairs.normal[c]), pairs.normal[c], pairs.normal_lift[c] @ self.moved @ self.rate)
 
+    @cached_property
+    def ways(self) -> Array:
+        """Of each contact (m, 2 + d): whether its slip is held, its sign at the beginning of the piece, and when [s]
+        that changes, behind which there is ``inf``. Slip without friction has no way."""
+        pairs, piece = self.regime.pairs, self.piece
+        found = np.full((pairs.count, 1 + piece.terms), np.inf)
+        found[:, :2] = 0.0
+        for c, held in enumerate(self.regime.follows):
+            if not held or pairs.sticking[c] == 0.0:
+                continue
+            lifted = self.regime.back @ self.holds
+            lift, row = pairs.tangent_lift[c], pairs.tangent[c]
+            own = (lift @ self.moved + row @ lifted) @ self.rate
+            terms = (np.abs(lift) @ np.abs(self.moved) + np.abs(row) @ np.abs(lifted)) @ self.rate
+            first, changes = turns(own[: piece.terms], terms[: piece.terms])
+            found[c, :2] = 1.0, first
+            found[c, 2 : 2 + len(changes)] = piece.start + piece.unit * np.array(changes)
+        return found
+
+    def way(self, c: int, time: float) -> float:
+        """The sign of a slip that is held, from a time on."""
+        _, first, *changes = self.ways[c]
+        passed = sum(change <= time + NEAR * self.piece.unit for change in changes)
+        return float(-first if passed % 2 else first)
+
+    @cached_property
+    def told(self) -> Status:
+        """The status as it is told: slip that is held at rest sticks, with the friction that it has."""
+        rests = (self.ways[:, 0] == 1.0) & (self.ways[:, 1] == 0.0)
+        return tuple(STICK if rest else now for rest, now in zip(rests, self.regime.status, strict=True))
+
     def rate_of(self, row: Row) -> Row:
         """The time derivative of a number of displacements and velocities."""
         q, v, p = self._acceleration
@@ -321,7 +419,7 @@ class Driven:
             else:
                 normal = held[c, "normal"]
             if now == STICK:
-                tangential = held[c, "tangent"]
+                tangential = held.get((c, "tangent"), none)
             else:
                 factor = -sense(now) * pairs.sliding[c]
                 tangential = Row(factor * normal.q, factor * normal.v, factor * normal.p)

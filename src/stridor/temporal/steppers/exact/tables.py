@@ -21,12 +21,13 @@ from .statuses import Driven, Flow, Row
     ENTER, REST, SLOW, POLES, REAL, IMAG, RATE_REAL, RATE_IMAG, SIZES, NUMBER_SLOW, MEANINGS, TURN_REAL, TURN_IMAG,
     BENT, TURNED, STATE, STATE_SLOW, AMOUNTS, AMOUNTS_SLOW, OBSERVED, OBSERVED_SLOW, OBSERVED_SIZES, OBSERVED_RATE,
     WHICH, QUADRATIC, CROSS_REAL, CROSS_IMAG, FORM_SLOW, STILL, RECORD_TURN, LONGEST, NUMBER_AMOUNTS,
-) = range(32)  # fmt: skip
-LEG = 32
+    TURNS, TOLD,
+) = range(34)  # fmt: skip
+LEG = 34
 # Of an option, rows on [q; v; p]: forces (2m, ·) normal and tangential by turns, the rates of slips and of openings,
-# gaps and openings (m, ·).
-FORCES, SLIP_RATE, OPENING_RATE, GAPS, OPENINGS = range(5)
-OPTION = 5
+# gaps and openings (m, ·); and the ways of slip that is held (m, ·).
+FORCES, SLIP_RATE, OPENING_RATE, GAPS, OPENINGS, WAYS = range(6)
+OPTION = 6
 UNKNOWN, JAMMED = -1, -2  # of an option or a leg
 
 
@@ -62,9 +63,10 @@ class Store:
 
 def leg_parts(
     flow: Flow, numbers: Numbers, number_slow: Array, number_amounts: Array, meanings: Array, table: Parts,
-    forms: Forms, observed: ComplexArray, slow: Array, between: float,
+    forms: Forms, observed: ComplexArray, slow: Array, between: float, turns: Array,
 ) -> list[Array]:  # fmt: skip
-    """The matrices of a leg in order; observed (o, f), slow (o, S): what is recorded; between [s]: two records."""
+    """The matrices of a leg in order; observed (o, f), slow (o, S): what is recorded; between [s]: two records;
+    turns (·, 2): when slip that is held comes to its end, and the number of its meaning."""
     split, z = flow.split, flow.z
     y = z.shape[1]
     left_q = split.left[:, :y] @ (flow.scale[:, None] * z.T)
@@ -90,6 +92,7 @@ def leg_parts(
         CROSS_REAL: forms.cross_real, CROSS_IMAG: forms.cross_imag, FORM_SLOW: forms.slow, STILL: forms.still,
         RECORD_TURN: np.stack([turn.real, turn.imag]),
         LONGEST: np.array([[table.longest]]), NUMBER_AMOUNTS: number_amounts,
+        TURNS: turns, TOLD: np.array(flow.told, dtype=float),
     }  # fmt: skip
     return [found[item] for item in range(LEG)]
 
@@ -109,4 +112,5 @@ def option_parts(driven: Driven) -> list[Array]:
         stacked([driven.rate_of(driven.opening(c)) for c in contacts]),
         stacked([driven.gap(c) for c in contacts]),
         stacked([driven.opening(c) for c in contacts]),
+        driven.ways,
     ]

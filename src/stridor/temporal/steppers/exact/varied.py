@@ -130,9 +130,9 @@ class VariedMotion(Motion):
         v, a, zeta, slow = self._rates(anchor, time)
         shift = np.zeros(self.dq.shape[1])
         dzeta, dslow, dq, dv = self._moved(anchor, time)
-        if change is not None:
-            watched = anchor.watched
-            i = watched.meanings.index(change)
+        watched = anchor.watched
+        i = -1 if change is None else watched.meanings.index(change)
+        if 0 <= i < len(watched.weights):  # slip that is held turns when supports do, whatever the state is
             weights, poles = watched.weights[i], watched.flow.split.poles
             turning = poles * weights * zeta
             drift = float(watched.slow[i] @ (watched.flow.slow @ slow))
@@ -142,8 +142,8 @@ class VariedMotion(Motion):
             if self.dq.shape[1]:
                 if abs(rate) <= GRAZING * size:
                     raise AnalysisError(
-                        f"a contact only just {change[0]} (grazing): the motion behind does not vary smoothly with the "
-                        "one before"
+                        f"a contact only just {watched.meanings[i][0]} (grazing): the motion behind does not vary "
+                        "smoothly with the one before"
                     )
                 shift = -((weights @ dzeta).real + watched.slow[i] @ dslow) / rate
         self.dq, self.dv = dq, dv
