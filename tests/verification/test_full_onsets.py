@@ -460,6 +460,28 @@ def test_an_onset_that_gets_lost_is_noticed(tmp_path: Path, monkeypatch: pytest.
     assert document["onsets"][0]["mu"] == pytest.approx(0.75)
 
 
+def test_many_modes_that_begin_to_grow_at_the_low_end_by_a_factor_that_is_no_polynomial(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """λ² − 2d sin(3μ) λ + ω² = 0: every mode grows from μ = 0 on with the slope 3d, and ends to at μ = π/3. Modes that are
+    equally damped are seen to grow at one value, a little above 0, and some slower ones later."""
+    squares, d = np.array([1.0, 2.2, 3.7, 5.1, 6.4]), np.array([0.1, 0.1, 0.1, 0.1, 0.001])
+    driven = -2 * np.diag(d * np.sqrt(squares))
+    terms = [(np.eye(5), "mass", ""), (np.diag(squares), "stiffness", ""), (driven, "damping", "sin(3*mu)")]
+
+    def refused(*_):
+        raise st.AnalysisError("branches are not followed here")
+
+    monkeypatch.setattr(full.search, "solved", refused)
+    found = st.onsets(matrix_case(tmp_path, terms, 1.0, (0.0, 1.2)))
+    begins = [o for o in found.onsets if not o.stabilising]
+    assert [o.mu for o in begins] == [0.0] * 5
+    assert [o.frequency_hz for o in begins] == pytest.approx(np.sqrt(squares) / (2 * np.pi), rel=1e-9)
+    assert [o.growth_slope for o in begins] == pytest.approx(3 * d * np.sqrt(squares), rel=1e-6)
+    assert [o.mu for o in found.onsets if o.stabilising] == pytest.approx([np.pi / 3] * 5, rel=1e-9)
+    assert found.complete, found.completeness
+
+
 @pytest.mark.parametrize("damping", [0.0, 4e-4])
 def test_growth_between_two_values_that_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damping: float):
     """λ² + cλ = −2 ± √(d² − q²) with d = μ − 0.5052: two modes meet and part within 2q, or growth of the one that c
