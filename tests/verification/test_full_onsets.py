@@ -482,6 +482,36 @@ def test_many_modes_that_begin_to_grow_at_the_low_end_by_a_factor_that_is_no_pol
     assert found.complete, found.completeness
 
 
+@pytest.mark.parametrize("followed", [True, False])
+@pytest.mark.parametrize("works_on", ["every motion", "vibration", "nothing"])
+def test_divergence_beside_the_zero_of_a_free_body(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, works_on: str, followed: bool
+):
+    """Two masses that move as a whole, K(μ)(1, 1)ᵀ = 0, and of whose difference z'' + cz' + (2 − 2μ)z = 0: it diverges
+    from μ = 1 on, where λ = 0 is a root of the body at every μ."""
+    c = {"every motion": 0.03, "vibration": 0.08, "nothing": 0.0}[works_on]
+    pair = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    damping = {"every motion": c * ONE, "vibration": 0.5 * c * pair, "nothing": None}[works_on]
+    terms = [(ONE, "mass", ""), (pair, "stiffness", ""), (np.array([[0.0, 0.0], [2.0, -2.0]]), "stiffness", "mu")]
+    if damping is not None:
+        terms.append((damping, "damping", ""))
+
+    def refused(*_):
+        raise st.AnalysisError("branches are not followed here")
+
+    if not followed:
+        monkeypatch.setattr(full.search, "solved", refused)
+    found = st.onsets(matrix_case(tmp_path, terms, 1.0, (0.0, 1.7)))
+    assert [(o.kind, o.stabilising) for o in found.onsets] == [("divergence", False)]
+    (onset,) = found.onsets
+    assert onset.mu == pytest.approx(1.0, rel=1e-11)
+    if c:
+        assert onset.growth_slope == pytest.approx(2 / c, rel=1e-6)
+    else:
+        assert onset.square_root_coefficient == pytest.approx(np.sqrt(2), rel=1e-6)
+    assert found.complete, found.completeness
+
+
 @pytest.mark.parametrize("damping", [0.0, 4e-4])
 def test_growth_between_two_values_that_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damping: float):
     """λ² + cλ = −2 ± √(d² − q²) with d = μ − 0.5052: two modes meet and part within 2q, or growth of the one that c

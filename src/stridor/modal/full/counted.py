@@ -64,11 +64,12 @@ class Lack:
 @dataclass(frozen=True)
 class Counted:
     """Growing roots at each value (μ, number) of a grid, onsets solved between them, and what passes the highest
-    frequency."""
+    frequency; rest [1/s]: up to which |λ| nothing was counted, as it may be a motion as a whole."""
 
     grid: tuple[tuple[float, int], ...]
     onsets: tuple[Onset, ...]
     passing: tuple[Passing, ...]
+    rest: float = 0.0
 
     def lacking(self, onsets: Sequence[Onset]) -> list[Lack]:
         """Between which values these onsets do not say what is counted; values that lie on an onset are not judged, but
@@ -77,7 +78,7 @@ class Counted:
         near = ON_IT * (high - low)
         judged = [
             (mu, n) for mu, n in self.grid
-            if mu in (low, high) or all(abs(o.mu - mu) > max(near, _unseen(o, high - low)) for o in onsets)
+            if mu in (low, high) or all(abs(o.mu - mu) > max(near, self._unseen(o)) for o in onsets)
         ]  # fmt: skip
         lacks: list[Lack] = []
         for (before, number), (after, later) in pairwise(judged):
@@ -95,13 +96,13 @@ class Counted:
                 lacks.append(Lack(before, after, later - number, said))
         return lacks
 
-
-def _unseen(onset: Onset, width: float) -> float:
-    """How far from an onset growth with its slope may still be too slow to count as growth, in a range so wide."""
-    if not onset.growth_slope:
-        return 0.0
-    slowest = UNSTABLE_RELATIVE * 2 * np.pi * onset.frequency_hz
-    return float(min(UNSURE * slowest / abs(onset.growth_slope), CLOSEST * width))
+    def _unseen(self, onset: Onset) -> float:
+        """How far from an onset growth with its slope may still be too slow to count as growth."""
+        if not onset.growth_slope:
+            return 0.0
+        slowest = UNSTABLE_RELATIVE * 2 * np.pi * onset.frequency_hz or self.rest
+        width = self.grid[-1][0] - self.grid[0][0]
+        return float(min(UNSURE * slowest / abs(onset.growth_slope), CLOSEST * width))
 
 
 @dataclass(frozen=True)
@@ -196,7 +197,8 @@ class _Search:
                         onsets.append(found)
         rounding = within_rounding(onsets)
         told = tuple(o for k, o in enumerate(onsets) if k not in rounding)
-        return Counted(tuple((self.start + c.t, self._number(c)) for c in grid), told, tuple(passing))
+        numbers = tuple((self.start + c.t, self._number(c)) for c in grid)
+        return Counted(numbers, told, tuple(passing), self.source.family.rest_limit(self.top))
 
     def _number(self, count: _Count) -> int:
         """How many roots grow, without those that open further on."""
@@ -301,6 +303,10 @@ class _Search:
         )
         # Growth is seen where it is more than rounding, and Newton's method ends where it begins, some way before that.
         slack, edge = 1e-6 * self.width + 2 * (high.t - low.t), 1e-9 * self.width
+        rate = abs(float(_rates(more.found)[index].real))
+        if abs(lam.imag) <= STILL * top and rate > 0.0:
+            # Below what may be a motion as a whole it is not seen at all.
+            slack += UNSURE * family.rest_limit(top) / rate
         first = max(self.start + low.t - slack, self.start + self.low - edge)
         last = min(self.start + high.t + slack, self.start + self.high + edge)
 
