@@ -165,8 +165,11 @@ def _across(family: Family, answer: Answer, ends: tuple[RegionModes, RegionModes
     """Words for what changes the number of growing modes beside the onsets: modes that cross the border of the band
     while they grow, and pairs that become two real roots."""
     across = _changes(family, answer, ends, top)[0]
+    limit = f"{top / (2 * np.pi):g} Hz"
+    if across and across == sum(p.roots for p in answer.passing):
+        return f" with those that pass {limit} while they grow"
     if across:
-        limit, count = f"{top / (2 * np.pi):g} Hz", (abs(across) + 1) // 2
+        count = (abs(across) + 1) // 2
         how = "whose growth began above" if across > 0 else "that went on growing above"
         return f" but for {count} {how} {limit}"
     return _pairs(family, answer, ends, top)
