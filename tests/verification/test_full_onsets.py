@@ -7,6 +7,7 @@ import warnings
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,7 +21,10 @@ from solid_cases import bench_as_solids, case, slider
 from stridor.modal import full
 from stridor.modal.checked_onsets import checked_onsets
 from stridor.modal.complex_modes import complex_modes
+from stridor.modal.full import words
+from stridor.modal.full.counted import Counted, Passing
 from stridor.modal.full.family import Family, Smooth, family_of
+from stridor.modal.full.search import Answer
 from stridor.modal.newton import Border
 from stridor.modal.onsets import onsets
 from stridor.modal.options import Options
@@ -480,6 +484,18 @@ def test_many_modes_that_begin_to_grow_at_the_low_end_by_a_factor_that_is_no_pol
     assert [o.growth_slope for o in begins] == pytest.approx(3 * d * np.sqrt(squares), rel=1e-6)
     assert [o.mu for o in found.onsets if o.stabilising] == pytest.approx([np.pi / 3] * 5, rel=1e-9)
     assert found.complete, found.completeness
+
+
+def test_growth_that_passes_the_end_of_the_band_and_comes_back_is_not_said_to_go_on_above_it():
+    """A growing pair leaves the band, and one real root comes into it: what was counted there accounts for the ends."""
+    family = Smooth((0.0, 1.0), lambda mu: Quadratic(*(sp.csr_array(a * ONE) for a in (1, -0.1, 1))))
+    first, last = (SimpleNamespace(values=np.array(v)) for v in ([0.1 + 0.9j], [0.7 + 0j]))
+    passing = Passing(0.4, 0.1 + 1j, -2), Passing(0.6, 1 + 0j, 1)
+    seen = Counted(((0.0, 2), (1.0, 1)), (), passing)
+    answer = Answer((), True, None, seen)
+    assert words._across(family, answer, (first, last), 1.0) == " with those that pass 0.159155 Hz while they grow"
+    unseen = words._across(family, Answer((), True), (first, last), 1.0)
+    assert unseen == " but for 1 that went on growing above 0.159155 Hz"
 
 
 @pytest.mark.parametrize("followed", [True, False])

@@ -53,7 +53,7 @@ def sentence(
             )
         return (
             f"{how}: {numbers}.{passing} Onsets were enclosed by that count, and branches not followed{why}; growth "
-            "that begins and ends again between two of these values may be missing."
+            "that begins and ends again, or ends and begins, between two of these values may be missing."
         )
     said = f"as the onsets say{_across(family, answer, ends, top)}"
     told = _followed(answer, name, value, where)
@@ -78,7 +78,7 @@ def _named(why: str, name: str, value: Callable[[float], float]) -> str:
 
 def _between_steps(answer: Answer, name: str) -> str:
     """What was looked at between both ends, and what that leaves out."""
-    missing = "growth that begins and ends again"
+    missing = "growth that begins and ends again, or ends and begins,"
     if not answer.values:
         return f"Between the ends nothing was counted: {missing} within one of the steps may be missing."
     return (
