@@ -7,6 +7,7 @@ import warnings
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,7 +21,10 @@ from solid_cases import bench_as_solids, case, slider
 from stridor.modal import full
 from stridor.modal.checked_onsets import checked_onsets
 from stridor.modal.complex_modes import complex_modes
+from stridor.modal.full import words
+from stridor.modal.full.counted import Counted, Passing
 from stridor.modal.full.family import Family, Smooth, family_of
+from stridor.modal.full.search import Answer
 from stridor.modal.newton import Border
 from stridor.modal.onsets import onsets
 from stridor.modal.options import Options
@@ -458,6 +462,70 @@ def test_an_onset_that_gets_lost_is_noticed(tmp_path: Path, monkeypatch: pytest.
     document = st.onsets(model).to_json()
     assert document["completeness"].startswith("Complete")
     assert document["onsets"][0]["mu"] == pytest.approx(0.75)
+
+
+def test_many_modes_that_begin_to_grow_at_the_low_end_by_a_factor_that_is_no_polynomial(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """λ² − 2d sin(3μ) λ + ω² = 0: every mode grows from μ = 0 on with the slope 3d, and ends to at μ = π/3. Modes that are
+    equally damped are seen to grow at one value, a little above 0, and some slower ones later."""
+    squares, d = np.array([1.0, 2.2, 3.7, 5.1, 6.4]), np.array([0.1, 0.1, 0.1, 0.1, 0.001])
+    driven = -2 * np.diag(d * np.sqrt(squares))
+    terms = [(np.eye(5), "mass", ""), (np.diag(squares), "stiffness", ""), (driven, "damping", "sin(3*mu)")]
+
+    def refused(*_):
+        raise st.AnalysisError("branches are not followed here")
+
+    monkeypatch.setattr(full.search, "solved", refused)
+    found = st.onsets(matrix_case(tmp_path, terms, 1.0, (0.0, 1.2)))
+    begins = [o for o in found.onsets if not o.stabilising]
+    assert [o.mu for o in begins] == [0.0] * 5
+    assert [o.frequency_hz for o in begins] == pytest.approx(np.sqrt(squares) / (2 * np.pi), rel=1e-9)
+    assert [o.growth_slope for o in begins] == pytest.approx(3 * d * np.sqrt(squares), rel=1e-6)
+    assert [o.mu for o in found.onsets if o.stabilising] == pytest.approx([np.pi / 3] * 5, rel=1e-9)
+    assert found.complete, found.completeness
+
+
+def test_growth_that_passes_the_end_of_the_band_and_comes_back_is_not_said_to_go_on_above_it():
+    """A growing pair leaves the band, and one real root comes into it: what was counted there accounts for the ends."""
+    family = Smooth((0.0, 1.0), lambda mu: Quadratic(*(sp.csr_array(a * ONE) for a in (1, -0.1, 1))))
+    first, last = (SimpleNamespace(values=np.array(v)) for v in ([0.1 + 0.9j], [0.7 + 0j]))
+    passing = Passing(0.4, 0.1 + 1j, -2), Passing(0.6, 1 + 0j, 1)
+    seen = Counted(((0.0, 2), (1.0, 1)), (), passing)
+    answer = Answer((), True, None, seen)
+    assert words._across(family, answer, (first, last), 1.0) == " with those that pass 0.159155 Hz while they grow"
+    unseen = words._across(family, Answer((), True), (first, last), 1.0)
+    assert unseen == " but for 1 that went on growing above 0.159155 Hz"
+
+
+@pytest.mark.parametrize("followed", [True, False])
+@pytest.mark.parametrize("works_on", ["every motion", "vibration", "nothing"])
+def test_divergence_beside_the_zero_of_a_free_body(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, works_on: str, followed: bool
+):
+    """Two masses that move as a whole, K(μ)(1, 1)ᵀ = 0, and of whose difference z'' + cz' + (2 − 2μ)z = 0: it diverges
+    from μ = 1 on, where λ = 0 is a root of the body at every μ."""
+    c = {"every motion": 0.03, "vibration": 0.08, "nothing": 0.0}[works_on]
+    pair = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    damping = {"every motion": c * ONE, "vibration": 0.5 * c * pair, "nothing": None}[works_on]
+    terms = [(ONE, "mass", ""), (pair, "stiffness", ""), (np.array([[0.0, 0.0], [2.0, -2.0]]), "stiffness", "mu")]
+    if damping is not None:
+        terms.append((damping, "damping", ""))
+
+    def refused(*_):
+        raise st.AnalysisError("branches are not followed here")
+
+    if not followed:
+        monkeypatch.setattr(full.search, "solved", refused)
+    found = st.onsets(matrix_case(tmp_path, terms, 1.0, (0.0, 1.7)))
+    assert [(o.kind, o.stabilising) for o in found.onsets] == [("divergence", False)]
+    (onset,) = found.onsets
+    assert onset.mu == pytest.approx(1.0, rel=1e-11)
+    if c:
+        assert onset.growth_slope == pytest.approx(2 / c, rel=1e-6)
+    else:
+        assert onset.square_root_coefficient == pytest.approx(np.sqrt(2), rel=1e-6)
+    assert found.complete, found.completeness
 
 
 @pytest.mark.parametrize("damping", [0.0, 4e-4])

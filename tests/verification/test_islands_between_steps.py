@@ -100,8 +100,8 @@ def test_how_closely_that_was_looked_at_is_said(tmp_path: Path, monkeypatch: pyt
     said = st.onsets(case_of(plain, tmp_path)).completeness
     assert said.startswith("Complete as far as both ends tell: 0 modes grow at μ = 0 and 0 at μ = 1")
     assert said.endswith(
-        "As many roots grow at each of 97 values of μ as the onsets say; growth that begins and ends again between two of "
-        "these values may be missing."
+        "As many roots grow at each of 97 values of μ as the onsets say; growth that begins and ends again, or ends and "
+        "begins, between two of these values may be missing."
     )
 
     def uncounted(*_: object) -> None:
@@ -110,5 +110,6 @@ def test_how_closely_that_was_looked_at_is_said(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr(search, "_borne_out", uncounted)
     said = st.onsets(case_of(plain, tmp_path)).completeness
     assert said.endswith(
-        "Between the ends nothing was counted: growth that begins and ends again within one of the steps may be missing."
+        "Between the ends nothing was counted: growth that begins and ends again, or ends and begins, within one of the "
+        "steps may be missing."
     )

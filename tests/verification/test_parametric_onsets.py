@@ -205,7 +205,7 @@ def test_counting_that_loses_an_onset_is_not_called_whole(monkeypatch: pytest.Mo
     found = onsets_along(model, "p")
     assert found.complete
     assert "branches not followed: not today" in found.sentence
-    solve, seen = counted._Search._solved, []
+    solve, seen = counted._Search._root, []
 
     def forgetful(*given):
         root = solve(*given)
@@ -215,7 +215,7 @@ def test_counting_that_loses_an_onset_is_not_called_whole(monkeypatch: pytest.Mo
         # The second is lost however closely it is looked for.
         return None if len(seen) > 1 and root.mu == pytest.approx(seen[1]) else root
 
-    monkeypatch.setattr(counted._Search, "_solved", forgetful)
+    monkeypatch.setattr(counted._Search, "_root", forgetful)
     fewer = onsets_along(model, "p")
     assert len(fewer) < len(found)
     assert not fewer.complete

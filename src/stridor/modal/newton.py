@@ -10,6 +10,7 @@ that are needed (Govaerts, Numerical Methods for Bifurcations of Dynamical Equil
     a damped onset          g = 0 with λ = jω, for ω and μ
     eigenvalues meet        g = ∂g/∂λ = 0 with λ = jω, where the problem is reversible
     divergence              g = 0 with λ = 0, for μ
+    of a free body          ∂g/∂λ = 0, or ∂²g/∂λ² = 0, with λ = 0, for μ
     an exceptional point    g = ∂g/∂λ = 0 for λ and a complex μ
 """
 
@@ -29,10 +30,13 @@ STEPS = 14
 CONVERGED = 1e-13
 # |Re λ| / |λ| up to which an eigenvalue is on the axis; not all processors know more than double precision.
 ON_AXIS = 1e-12 if np.finfo(np.longdouble).eps < 1e-18 else 1e-9
+SERIES = 5  # powers of λ, from the zeroth on
 STALLED = 0.5  # of the smallest step so far: a longer one is made of rounding
 IDLE = 3
 MET = 1e-8  # relative step at which a complex meeting is settled, if no further one is shorter
 ROUNDING = 1e-10  # |Re λ| / |λ| that may be left of slow modes of stiff structures
+RESTS = 1e-13  # backward error of λ = 0 that is rounding of the stiffness, as files of fourteen digits leave it
+TOO_LARGE = 1e8  # times its entry at the border, of a vector there
 FLAT = 1e-9  # dRe λ/dμ times the range, over |λ|, below which friction has no say in it
 
 
@@ -177,6 +181,26 @@ class Border:
             x, y,
         )  # fmt: skip
 
+    def series(self, mu: float) -> ComplexArray:
+        """Coefficients (SERIES,) of g over λ at λ = 0: with P(λ)x = −g e, x = Σ λᵏ xₖ, K xₖ + γₖ e = −C xₖ₋₁ − M xₖ₋₂.
+        Raises AnalysisError where even the bordered matrix is singular."""
+        here = self.problem.at(mu)
+        factor, n = self.problem.bordered(here, 0j, self), here.mass.shape[0]
+        right, found = np.zeros(n + 1, dtype=complex), np.zeros(SERIES, dtype=complex)
+        right[n] = self.scale
+        vectors: list[ComplexArray] = []
+        try:
+            for k in range(SERIES):
+                answer = factor.solve(right)
+                found[k] = answer[n]
+                vectors.append(answer[:n])
+                right = np.append(-times(here.damping, vectors[k]), 0j)
+                if k:
+                    right[:n] -= times(here.mass, vectors[k - 1])
+        finally:
+            factor.free()
+        return found
+
 
 def crossing(
     problem: NewtonProblem, mu: float, lam: complex, x: ComplexArray, y: ComplexArray, between: tuple[float, float]
@@ -285,9 +309,15 @@ def _to_double(here: NewtonPoint) -> tuple[complex, complex]:
 def standstill(
     problem: NewtonProblem, mu: float, x: ComplexArray, y: ComplexArray, between: tuple[float, float]
 ) -> Root | None:
-    """Where the stiffness becomes singular, λ = 0; None where that does not settle."""
+    """Where the stiffness becomes singular, λ = 0, or another root leaves zero where it is so at every μ; None where
+    that does not settle."""
     width = between[1] - between[0]
     border, steps = Border(problem, x, y), _Steps(ON_AXIS)
+    zeros = _zeros(border, between[0])
+    if zeros:
+        zeros = min(zeros, _zeros(border, between[1]))
+    if zeros:
+        return _beside_zero(border, mu, between, zeros)
     for _ in range(STEPS):
         try:
             here = border.at(0.0, mu)
@@ -312,6 +342,57 @@ def standstill(
     if here.by_lam == 0:
         return None
     return _judged(problem, mu, 0j, here, float((-here.by_mu / here.by_lam).real), None)
+
+
+def _beside_zero(border: Border, mu: float, between: tuple[float, float], zeros: int) -> Root | None:
+    """Where one more root than the ``zeros`` that a motion without stiffness has at every μ is zero.
+
+    With Kv = 0 at every μ, g = γ₁λ + γ₂λ² + γ₃λ³ + …, and with Cv = 0 γ₁ is zero as well. The root beside these is
+    λ = −γₖ/γₖ₊₁, or λ² = −γ₂/γ₄ of a reversible problem, and passes zero where γₖ does: γ₁ is yᵀCv, or γ₂ yᵀMv, with
+    the left vector y of K(μ) but for a factor. By secants.
+    """
+    problem, width = border.problem, between[1] - between[0]
+    before = mu + 0.1 * max(between[1] - mu, between[0] - mu, key=abs)
+    try:
+        last, rate, settled = float(border.series(before)[zeros].real), 0.0, False
+        for _ in range(2 * STEPS):
+            series = border.series(mu)
+            value = float(series[zeros].real)
+            if mu != before and value != last:
+                rate = (value - last) / (mu - before)
+            step = -value / rate if rate else np.inf
+            if not between[0] - width <= mu + step <= between[1] + width:
+                return None
+            settled = abs(step) <= ON_AXIS * max(abs(mu), 1e-3 * width)
+            before, last, mu = mu, value, mu + step
+            if settled:
+                break
+        series, here = border.series(mu), border.at(0.0, mu)
+    except AnalysisError:
+        return None
+    more = float(series[zeros + (2 if problem.reversible else 1)].real)
+    if not settled or more == 0.0:
+        return None
+    slope, square = (None, -rate / more) if problem.reversible else (-rate / more, None)
+    return _judged(problem, mu, 0j, here, slope, square)
+
+
+def _zeros(border: Border, mu: float) -> int:
+    """How many roots λ are zero at μ but for rounding, of the one motion that no stiffness resists: 2 where nothing
+    damps it either."""
+    problem = border.problem
+    at = min(max(mu, problem.low), problem.high)
+    try:
+        here, known = border.at(0.0, at), problem.at(at)
+    except AnalysisError:
+        return 0
+    if problem.backward_error(at, 0j, here.x) > RESTS:
+        return 0
+    # Where more than one is at rest the border is too narrow, and x is what rounding makes of it.
+    if np.max(problem.sizes * np.abs(here.x)) > TOO_LARGE * problem.sizes[border.column]:
+        return 0
+    damped = abs(here.by_lam) * border.scale
+    return 1 if damped > RESTS * float(np.abs(here.y) @ (abs(known.damping) @ np.abs(here.x))) else 2
 
 
 def _judged(

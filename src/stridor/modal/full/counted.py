@@ -9,7 +9,7 @@ Newton solves for it in the full problem. A mode that passes |λ| = ω_max while
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +18,7 @@ from scipy.optimize import linear_sum_assignment
 from ...typing import BoolArray, ComplexArray
 from ..dense_problem import Eigenpairs
 from ..histories import within_rounding
-from ..newton import Root, crossing, meeting, standstill
+from ..newton import CONVERGED, Root, crossing, meeting, standstill
 from ..onset import Onset
 from ..quadratic.polish import pairs
 from ..tolerances import UNSTABLE_RELATIVE
@@ -64,11 +64,12 @@ class Lack:
 @dataclass(frozen=True)
 class Counted:
     """Growing roots at each value (μ, number) of a grid, onsets solved between them, and what passes the highest
-    frequency."""
+    frequency; rest [1/s]: up to which |λ| nothing was counted, as it may be a motion as a whole."""
 
     grid: tuple[tuple[float, int], ...]
     onsets: tuple[Onset, ...]
     passing: tuple[Passing, ...]
+    rest: float = 0.0
 
     def lacking(self, onsets: Sequence[Onset]) -> list[Lack]:
         """Between which values these onsets do not say what is counted; values that lie on an onset are not judged, but
@@ -77,7 +78,7 @@ class Counted:
         near = ON_IT * (high - low)
         judged = [
             (mu, n) for mu, n in self.grid
-            if mu in (low, high) or all(abs(o.mu - mu) > max(near, _unseen(o, high - low)) for o in onsets)
+            if mu in (low, high) or all(abs(o.mu - mu) > max(near, self._unseen(o)) for o in onsets)
         ]  # fmt: skip
         lacks: list[Lack] = []
         for (before, number), (after, later) in pairwise(judged):
@@ -95,13 +96,13 @@ class Counted:
                 lacks.append(Lack(before, after, later - number, said))
         return lacks
 
-
-def _unseen(onset: Onset, width: float) -> float:
-    """How far from an onset growth with its slope may still be too slow to count as growth, in a range so wide."""
-    if not onset.growth_slope:
-        return 0.0
-    slowest = UNSTABLE_RELATIVE * 2 * np.pi * onset.frequency_hz
-    return float(min(UNSURE * slowest / abs(onset.growth_slope), CLOSEST * width))
+    def _unseen(self, onset: Onset) -> float:
+        """How far from an onset growth with its slope may still be too slow to count as growth."""
+        if not onset.growth_slope:
+            return 0.0
+        slowest = UNSTABLE_RELATIVE * 2 * np.pi * onset.frequency_hz or self.rest
+        width = self.grid[-1][0] - self.grid[0][0]
+        return float(min(UNSURE * slowest / abs(onset.growth_slope), CLOSEST * width))
 
 
 @dataclass(frozen=True)
@@ -196,7 +197,8 @@ class _Search:
                         onsets.append(found)
         rounding = within_rounding(onsets)
         told = tuple(o for k, o in enumerate(onsets) if k not in rounding)
-        return Counted(tuple((self.start + c.t, self._number(c)) for c in grid), told, tuple(passing))
+        numbers = tuple((self.start + c.t, self._number(c)) for c in grid)
+        return Counted(numbers, told, tuple(passing), self.source.family.rest_limit(self.top))
 
     def _number(self, count: _Count) -> int:
         """How many roots grow, without those that open further on."""
@@ -205,9 +207,9 @@ class _Search:
     def _explained(self, low: _Count, high: _Count) -> Iterator[Onset | Passing]:
         """What changes in an interval; where neither is found in it, in its halves: half of a pair that falls apart
         above the band comes into it faster than any mode."""
-        root = self._solved(low, high)
-        if root is not None:
-            yield as_onset(self.source.family, root)
+        roots = self._solved(low, high)
+        if roots:
+            yield from (as_onset(self.source.family, root) for root in roots)
         elif (lam := self._at_edge(low, high)) is not None:
             yield Passing(self.start + high.t, lam, high.number - low.number)
         elif high.t - low.t > SMALLEST * self.width:
@@ -269,27 +271,47 @@ class _Search:
                 return complex(values[np.flatnonzero(near)[0]])
         return None
 
-    def _solved(self, low: _Count, high: _Count) -> Root | None:
-        """The onset in an interval in which one mode begins or ceases to grow; None where none is found."""
-        family, top = self.source.family, self.top
+    def _solved(self, low: _Count, high: _Count) -> list[Root]:
+        """The onset in an interval in which one mode begins or ceases to grow, or those in one that is not halved any
+        more, in which several may; none where none is found."""
         more, fewer = (high, low) if high.number > low.number else (low, high)
         mine, others = np.flatnonzero(more.growing), np.flatnonzero(fewer.growing)
-        known, _ = pairs(more.found.values[mine], fewer.found.values[others], 1e-2 * top)
+        known, _ = pairs(more.found.values[mine], fewer.found.values[others], 1e-2 * self.top)
         fresh = np.setdiff1d(np.arange(len(mine)), known)
         if not len(fresh):
             fresh = np.arange(len(mine))
-        index = int(mine[fresh[np.argmin(more.found.values[mine[fresh]].real)]])
+        slowest = mine[fresh[np.argsort(more.found.values[mine[fresh]].real, kind="stable")]].tolist()
+        several = high.t - low.t <= SMALLEST * self.width
+        lacking, roots = more.number - fewer.number, list[Root]()
+        for index in slowest if several else slowest[:1]:
+            root = self._root(low, high, more, index)
+            if root is None or any(self._same(*(as_onset(self.source.family, r) for r in (root, o))) for o in roots):
+                continue
+            roots.append(root)
+            lacking -= 2 if root.lam else 1
+            if lacking <= 0:
+                break
+        return roots
+
+    def _root(self, low: _Count, high: _Count, more: _Count, index: int) -> Root | None:
+        """The onset in an interval of one mode that grows at the end of it at which more do."""
+        family, top = self.source.family, self.top
         lam, mu = complex(more.found.values[index]), self.start + more.t
         x, y = (
             self.source.vectors(v[:, [index]], more.t, left=left)[:, 0]
             for v, left in ((more.found.right, False), (more.found.left, True))
         )
-        between = (self.start + low.t, self.start + high.t)
+        # Growth is seen where it is more than rounding, and Newton's method ends where it begins, some way before that.
         slack, edge = 1e-6 * self.width + 2 * (high.t - low.t), 1e-9 * self.width
-        first = max(between[0] - slack, self.start + self.low - edge)
-        last = min(between[1] + slack, self.start + self.high + edge)
+        rate = abs(float(_rates(more.found)[index].real))
+        if abs(lam.imag) <= STILL * top and rate > 0.0:
+            # Below what may be a motion as a whole it is not seen at all.
+            slack += UNSURE * family.rest_limit(top) / rate
+        first = max(self.start + low.t - slack, self.start + self.low - edge)
+        last = min(self.start + high.t + slack, self.start + self.high + edge)
 
         def candidates() -> Iterator[Root | None]:
+            between = (first, last)
             if abs(lam.imag) <= STILL * top:
                 yield standstill(family, mu, x, y, between)
             if not family.reversible:
@@ -300,8 +322,9 @@ class _Search:
             # The root of another mode, or one that lies outside of what is searched, is none.
             if root is None or not first <= root.mu <= last:
                 continue
-            if abs(root.lam.imag - lam.imag) <= AWAY * max(abs(lam), top) and ends(root) == (more is low):
-                return root
+            if abs(root.lam.imag - lam.imag) <= AWAY * max(abs(lam), top) and ends(root) == (more.t == low.t):
+                at_low = abs(root.mu - self.start - self.low) <= CONVERGED * self.width
+                return replace(root, mu=self.start + self.low) if at_low else root
         return None
 
 

@@ -181,7 +181,7 @@ def _borne_out(answer: Answer, between: tuple[float, float], top: float) -> Coun
     def roots(mu: float) -> int:
         return number(mu) if by_itself and mu - source.family.low > hidden else number_at(source, mu, top, opened)
 
-    return Counted(tuple((mu, roots(mu)) for mu in values), (), ())
+    return Counted(tuple((mu, roots(mu)) for mu in values), (), (), source.family.rest_limit(top))
 
 
 def _within(source: Along, step: tuple[float, float], between: tuple[float, float], top: float) -> list[float]:
@@ -228,7 +228,7 @@ def _walked(
     onsets = tuple(o for k, o in enumerate(every) if k not in rounding)
     number = _number_by(family, top)
     grid = tuple((mu, number(mu)) for mu in _sampled(onsets, between))
-    seen = Counted(grid, onsets, ())
+    seen = Counted(grid, onsets, (), family.rest_limit(top))
     if seen.lacking(onsets) or not _ends_agree(family, seen, ends, top):
         return None
     inside = tuple(o for o in onsets if between[0] <= o.mu <= between[1])

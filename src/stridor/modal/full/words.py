@@ -53,7 +53,7 @@ def sentence(
             )
         return (
             f"{how}: {numbers}.{passing} Onsets were enclosed by that count, and branches not followed{why}; growth "
-            "that begins and ends again between two of these values may be missing."
+            "that begins and ends again, or ends and begins, between two of these values may be missing."
         )
     said = f"as the onsets say{_across(family, answer, ends, top)}"
     told = _followed(answer, name, value, where)
@@ -78,7 +78,7 @@ def _named(why: str, name: str, value: Callable[[float], float]) -> str:
 
 def _between_steps(answer: Answer, name: str) -> str:
     """What was looked at between both ends, and what that leaves out."""
-    missing = "growth that begins and ends again"
+    missing = "growth that begins and ends again, or ends and begins,"
     if not answer.values:
         return f"Between the ends nothing was counted: {missing} within one of the steps may be missing."
     return (
@@ -165,8 +165,11 @@ def _across(family: Family, answer: Answer, ends: tuple[RegionModes, RegionModes
     """Words for what changes the number of growing modes beside the onsets: modes that cross the border of the band
     while they grow, and pairs that become two real roots."""
     across = _changes(family, answer, ends, top)[0]
+    limit = f"{top / (2 * np.pi):g} Hz"
+    if across and across == sum(p.roots for p in answer.passing):
+        return f" with those that pass {limit} while they grow"
     if across:
-        limit, count = f"{top / (2 * np.pi):g} Hz", (abs(across) + 1) // 2
+        count = (abs(across) + 1) // 2
         how = "whose growth began above" if across > 0 else "that went on growing above"
         return f" but for {count} {how} {limit}"
     return _pairs(family, answer, ends, top)
