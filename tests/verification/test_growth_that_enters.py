@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import stridor as st
-from stridor.modal.histories import Entries
+from stridor.modal.histories import Entries, StabilityChange
 from stridor.modal.onset import Onset, Onsets
 from stridor.modal.options import Options
 from stridor.modal.over_friction import onsets_of_band
@@ -71,11 +71,24 @@ def test_growth_that_goes_on_does(source: str, rate: float) -> None:
     assert grown.complete
 
 
-def end(mu: float, omega: float) -> Onset:
-    return Onset(
-        mu, omega / (2 * np.pi), "flutter", damped=True, stabilising=True, branches=(1, 2), residual=1e-16,
+@pytest.mark.parametrize("source", NAMES)
+def test_growth_goes_on_beyond_an_exceptional_point(source: str) -> None:
+    """The same bench with one freedom damped twice as the other: next to where modes meet branches exchange growth."""
+    friction = {"law": "coulomb", "coefficient": 0.5}
+    contact = {"normal": N.tolist(), "tangent": T.tolist(), "stiffness": 1.0, "friction": friction}
+    system = st.System.from_matrices(np.eye(2), np.diag([1e-6, 2e-6]), OWN, contacts={"c": contact})
+    listed = onsets_of_band(system, (0.0, 1.1), 1.72 / (2 * np.pi), options=Options(source=source))
+    assert [(o.stabilising, o.enters_at is None) for o in listed] == [(False, False), (True, True)]
+    assert listed.onsets[0].enters_at == pytest.approx(enters(1.72, 0.0, 0.0), abs=0.02)
+    assert listed.complete
+
+
+def end(mu: float, omega: float, branch: int = 1) -> list[StabilityChange]:
+    onset = Onset(
+        mu, omega / (2 * np.pi), "flutter", damped=True, stabilising=True, branches=(branch, 9), residual=1e-16,
         square_root_coefficient=None, growth_slope=-1.0,
     )  # fmt: skip
+    return [StabilityChange(mu, (branch,), onset)]
 
 
 def test_the_end_of_growth_is_held_against_the_entry() -> None:
@@ -94,3 +107,19 @@ def test_the_end_of_growth_is_held_against_the_entry() -> None:
     assert grows.after((2,), 0.1) is None
     assert decays.after((1,), 0.1) is None
     assert decays.after((1,), 0.21, end(0.29, 0.95)) == pytest.approx(0.25)  # it begins and ends within the step
+
+
+def test_growth_that_is_handed_over_enters_on_the_other_branch() -> None:
+    """Beside an exceptional point one branch ceases to grow and another of its frequency begins to; the other way round
+    it ends there, or where an end was solved."""
+    watched = Entries(1.0)
+    for between, grows, decays in (((0.2, 0.3), 1.2, 1.3), ((0.3, 0.4), 1.16, 1.2), ((0.4, 0.5), 0.9, 1.1)):
+        handed = between[0] >= 0.3  # from branch 1 to branch 2
+        before = [-0.1 + 1.2j, 0.1 + 1.2j] if handed and between[0] > 0.3 else [0.1 + 1.2j, -0.1 + 1.2j]
+        after = [-0.1 + 1j * decays, 0.1 + 1j * grows] if handed else [0.1 + 1j * grows, -0.1 + 1j * decays]
+        watched.watch(between, np.array(before), np.array(after), [1, 2])
+    assert watched.after((1,), 0.2) == pytest.approx(0.4667, abs=1e-3)
+    assert watched.after((2,), 0.2) == pytest.approx(0.4667, abs=1e-3)
+    assert watched.after((1,), 0.2, end(0.45, 0.95, branch=2)) == 0.45
+    assert watched.after((1,), 0.2, end(0.42, 1.05, branch=2)) is None
+    assert watched.after((1,), 0.2, end(0.35, 1.15, branch=1)) is None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import pi
 
@@ -13,6 +13,9 @@ from .onset import AT_ONSET, AtTop, Onset
 from .tolerances import SPLIT_RELATIVE, UNSTABLE_RELATIVE
 
 ALIKE = 0.05  # of a frequency: how far apart the beginning and the end of a mode's growth within rounding may be
+BETWEEN = 7  # values between them at which nothing may grow
+
+Values = Callable[[float], ComplexArray]  # λ (k,) of all that is followed, at μ
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,16 @@ class _Entry:
     grows: bool
 
 
+@dataclass(frozen=True)
+class _HandOver:
+    """Between two neighbouring μ one branch ceases to grow and another like it begins to: beside an exceptional point
+    it is one growth, and which of the branches has it is a matter of numbering."""
+
+    low: float
+    high: float
+    to: int
+
+
 class Entries:
     """Where branches come into the band from above its end at the angular frequency top [1/s], and ``passed``: all that
     pass it either way and may grow there."""
@@ -45,6 +58,7 @@ class Entries:
     def __init__(self, top: float) -> None:
         self.top = top
         self.found: dict[int, list[_Entry]] = {}
+        self.handed: dict[int, list[_HandOver]] = {}
         self.passed: list[AtTop] = []
 
     def watch(
@@ -52,6 +66,12 @@ class Entries:
     ) -> None:
         """Take note of the eigenvalues old (k,) and new (k,) of branches (k,) at two neighbouring μ."""
         step = between[1] - between[0]
+        grew, growing = (v.real > UNSTABLE_RELATIVE * np.abs(v) for v in (old, new))
+        began = np.flatnonzero(~grew & growing)
+        for i in np.flatnonzero(grew & ~growing).tolist() if len(began) else ():
+            k = int(began[np.argmin(np.abs(new[began] - old[i]))])
+            if abs(new[k].imag - old[i].imag) <= ALIKE * abs(old[i]):
+                self.handed.setdefault(int(branch[i]), []).append(_HandOver(*between, int(branch[k])))
         for i in np.flatnonzero((old.imag > self.top) != (new.imag > self.top)).tolist():
             growth = [float(v.real) / max(abs(v), 1e-300) for v in (old[i], new[i])]
             grows, up = max(growth) > UNSTABLE_RELATIVE, new[i].imag > self.top
@@ -64,13 +84,26 @@ class Entries:
             least = 2 if min(growth) > SPLIT_RELATIVE else 0
             self.passed.append(AtTop(*between, *((least, 2) if up else (-2, -least))))
 
-    def after(self, branches: tuple[int, ...], mu: float, end: Onset | None = None) -> float | None:
+    def after(self, branches: Iterable[int], mu: float, changes: Sequence[StabilityChange] = ()) -> float | None:
         """The first μ from ``mu`` on, where one of these branches grows, at which it comes into the band with that
-        growth, to about a step; end: the onset where the growth ends, None: where none was seen.
+        growth, to about a step; changes: among which the onset is where the growth ends, if one was seen.
 
         It does not where both sides of the step decay, nor behind the end. Of one step with the end that end's
-        frequency says which of them is the first.
+        frequency says which of them is the first. Growth that is handed over to another branch goes on there.
         """
+        own, done = set(branches), set[_HandOver]()
+        while True:
+            end = next_end(changes, own, mu)
+            came = self._entry(own, mu, end)
+            over = [h for b in own for h in self.handed.get(b, []) if h.high > mu and h not in done]
+            over = [h for h in over if end is None or h.high < end.mu]
+            first = min(over, key=lambda h: h.low, default=None)
+            if first is None or (came is not None and came <= first.low):
+                return came
+            own, mu = {first.to}, max(mu, first.low)
+            done.add(first)
+
+    def _entry(self, branches: set[int], mu: float, end: Onset | None) -> float | None:
         entering: list[float] = []
         for entry in (entry for b in branches for entry in self.found.get(b, [])):
             if entry.high < mu or not (entry.grows or entry.low <= mu):
@@ -105,7 +138,7 @@ def reported(
         if onset.frequency_hz > max_frequency_hz:
             if onset.stabilising:
                 continue
-            enters = entries.after(change.branches, onset.mu, next_end(every, change.branches, onset.mu))
+            enters = entries.after(change.branches, onset.mu, every)
             if enters is None or enters > high:
                 continue
             onset = replace(onset, enters_at=enters)
@@ -120,7 +153,7 @@ def entering(
     """λ of branches that are ``growing`` above the band where the range begins, by number, and the μ at which they come
     into it with that growth."""
     above = {b: lam for b, lam in growing.items() if lam.imag > entries.top}
-    came = {b: entries.after((b,), low, next_end(changes, (b,), low)) for b in above}
+    came = {b: entries.after((b,), low, changes) for b in above}
     return tuple((lam, mu) for b, lam in above.items() if (mu := came[b]) is not None)
 
 
@@ -202,13 +235,15 @@ def _is_one_of(change: StabilityChange, others: Iterable[StabilityChange]) -> bo
     )
 
 
-def within_rounding(onsets: Sequence[Onset]) -> set[int]:
+def within_rounding(onsets: Sequence[Onset], values: Values) -> set[int]:
     """Places in ``onsets`` of beginnings and ends between which a mode grows by rounding alone:
     a damping ratio that only touches zero, which Newton's method finds twice beside it, and undamped modes that cross,
-    which rounding makes meet and part again at one place, in either order.
+    which rounding makes meet and part again at one place, in either order. values: λ at a μ between them.
 
     With zeros a and b, b − a = w, and slopes s and −s' there the growth between them is that of the cubic, at most
     4/27 (s + s') w; where undamped modes meet it is κ √w at most. Up to a share of |λ| it counts nowhere as growth.
+    Beside an exceptional point growth is no cubic, and may be far more than the slopes at its feet tell: therefore it
+    is looked at in between.
     """
     found: set[int] = set()
     for k, begins in enumerate(onsets):
@@ -216,10 +251,22 @@ def within_rounding(onsets: Sequence[Onset]) -> set[int]:
             continue
         ends = (m for m, o in enumerate(onsets) if o.stabilising and m not in found and _of_one_mode(begins, o))
         for m in sorted(ends, key=lambda m: abs(onsets[m].mu - begins.mu)):
-            if _stays_within(begins, onsets[m]):
+            if _stays_within(begins, onsets[m]) and not _grows_between(begins, onsets[m], values):
                 found |= {k, m}
                 break
     return found
+
+
+def _grows_between(begins: Onset, ends: Onset, values: Values) -> bool:
+    """Whether a damped mode like theirs is seen to grow beyond rounding between them."""
+    if begins.growth_slope is None and ends.growth_slope is None:
+        return False  # undamped modes that cross, in either order
+    for mu in np.linspace(begins.mu, ends.mu, BETWEEN + 2)[1:-1].tolist():
+        lam = values(mu)
+        like = np.abs(np.abs(lam.imag) - 2 * pi * begins.frequency_hz) <= ALIKE * 2 * pi * begins.frequency_hz
+        if np.any(like & (lam.real > UNSTABLE_RELATIVE * np.abs(lam))):
+            return True
+    return False
 
 
 def _of_one_mode(one: Onset, other: Onset) -> bool:
@@ -244,10 +291,10 @@ def _stays_within(begins: Onset, ends: Onset) -> bool:
     return bool(width >= 0.0 and grows <= UNSTABLE_RELATIVE * size)
 
 
-def beyond_rounding(changes: Sequence[StabilityChange]) -> list[int]:
+def beyond_rounding(changes: Sequence[StabilityChange], values: Values) -> list[int]:
     """Places of the changes that are left without those of growth within rounding (`within_rounding`), found at both
     branches or at one."""
     solved = [c for c in once_each(changes) if c.onset is not None]
     onsets = [c.onset for c in solved if c.onset is not None]
-    gone = [solved[k] for k in within_rounding(onsets)]
+    gone = [solved[k] for k in within_rounding(onsets, values)]
     return [k for k, change in enumerate(changes) if not _is_one_of(change, gone)]

@@ -80,6 +80,7 @@ def onsets_by_receptance(
         fixed = _growing(spectrum.fixed, top)
         return Onsets((), (low, high), max_frequency_hz, has_damping, open_contacts, at_start=fixed, at_end=fixed)
     events: list[_Event] = []
+    states: list[RootState] = []
     grown: set[int] = set()
     entries = Entries(top)
     # Roots that start above the band may meet inside it; follow some beyond.
@@ -87,6 +88,7 @@ def onsets_by_receptance(
 
     def watch(old: RootState, new: RootState) -> None:
         count = len(old.roots)
+        states.append(old)
         events.extend(_passages(old, new, has_damping))
         grown.update(new.branch[grows(new.roots, 0.0)].tolist())
         entries.watch((old.mu, new.mu), old.roots, new.roots[:count], new.branch[:count])
@@ -101,7 +103,15 @@ def onsets_by_receptance(
         (StabilityChange(event.mu, _concerned(event), _located(spectrum, family, judge, event, order, has_damping)), k)
         for k, event in _beyond_rounding(events, grown)
     ]
-    passed = [passed[k] for k in beyond_rounding([change for change, _ in passed])]
+
+    def values(mu: float) -> ComplexArray:
+        behind = max((k for k, state in enumerate(states) if state.mu <= mu), default=0)
+        try:
+            return Tracker.resumed(spectrum, states[behind]).advance(mu).roots
+        except AnalysisError:  # beside a meeting: what both sides of the step tell
+            return np.concatenate([state.roots for state in [*states, end][behind : behind + 2]])
+
+    passed = [passed[k] for k in beyond_rounding([change for change, _ in passed], values)]
     changes = [change for change, _ in passed]
     return Onsets(
         tuple(reported(changes, entries, (low, high), max_frequency_hz, _begun(start, has_damping, top))),

@@ -16,7 +16,7 @@ import numpy as np
 from ...typing import ComplexArray
 from ..at_rest import moving
 from ..dense_problem import eigenvalues
-from ..histories import StabilityChange, entering, next_end, within_rounding
+from ..histories import StabilityChange, entering, within_rounding
 from ..krylov.exceptional import exceptional_point
 from ..krylov.follow import BranchState
 from ..krylov.passages import Passage
@@ -122,7 +122,9 @@ def solved(
         if not any(_same(one.onset, other.onset, family) for other in found):
             found.append(one)
             changes.append(StabilityChange(one.onset.mu, concerned, one.onset))
-    rounding = within_rounding([f.onset for f in found])
+    rounding = within_rounding(
+        [f.onset for f in found], lambda mu: source.eigenpairs(mu - family.low).values
+    )
     found = [f for k, f in enumerate(found) if k not in rounding]
     changes = [c for k, c in enumerate(changes) if k not in rounding]
     found = [_entering(one, change, changes, way) for one, change in zip(found, changes, strict=True)]
@@ -149,7 +151,7 @@ def _entering(
     onset = one.onset
     if onset.stabilising or 2 * np.pi * onset.frequency_hz <= way.entries.top:
         return one
-    enters = way.entries.after(change.branches, onset.mu, next_end(changes, change.branches, onset.mu))
+    enters = way.entries.after(change.branches, onset.mu, changes)
     return replace(one, onset=replace(onset, enters_at=enters))
 
 

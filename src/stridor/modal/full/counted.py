@@ -195,7 +195,7 @@ class _Search:
                         passing.append(found)
                     elif not any(self._same(found, other) for other in onsets):
                         onsets.append(found)
-        rounding = within_rounding(onsets)
+        rounding = within_rounding(onsets, lambda mu: self.source.eigenpairs(mu - self.start).values)
         told = tuple(o for k, o in enumerate(onsets) if k not in rounding)
         numbers = tuple((self.start + c.t, self._number(c)) for c in grid)
         return Counted(numbers, told, tuple(passing), self.source.family.rest_limit(self.top))

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import AnalysisError
+from ...typing import ComplexArray
 from ..at_rest import more_slow, moving
 from ..histories import within_rounding
 from ..onset import Onset
@@ -224,7 +225,7 @@ def _walked(
     if walk is None:
         return None
     every = sorted((as_onset(family, root) for root in walk.roots), key=_order)
-    rounding = within_rounding(every)
+    rounding = within_rounding(every, _values_by(family, top))
     onsets = tuple(o for k, o in enumerate(every) if k not in rounding)
     number = _number_by(family, top)
     grid = tuple((mu, number(mu)) for mu in _sampled(onsets, between))
@@ -233,6 +234,14 @@ def _walked(
         return None
     inside = tuple(o for o in onsets if between[0] <= o.mu <= between[1])
     return Answer(inside, True, None, seen, (), why, walk.values)
+
+
+def _values_by(family: Family, top: float) -> Callable[[float], ComplexArray]:
+    """λ at a μ that may grow, in the full problem."""
+    if family.size > SMALL:
+        source = Whole(family, top, beside=True)
+        return lambda mu: source.eigenpairs(mu - family.low).values
+    return lambda mu: all_values(family, mu, top)
 
 
 def _number_by(family: Family, top: float) -> Callable[[float], int]:

@@ -102,7 +102,7 @@ def krylov_onsets(
         onset = _located(telling if passage.kind == "crossing" else reduced, passage, (0.0, high), limit)
         lost = _lost(passage, top) if onset is None else (0, 0)
         changes.append(StabilityChange(passage.low, concerned, onset, lost))
-    changes = [changes[k] for k in beyond_rounding(changes)]
+    changes = [changes[k] for k in beyond_rounding(changes, lambda mu: reduced.untracked(mu).values)]
     return Onsets(
         tuple(reported(changes, way.entries, (low, high), max_frequency_hz, way.from_start)),
         (low, high),

@@ -40,8 +40,9 @@ REACH = 1.0 + 1e-9
 class ReducedModes(Tabular):
     """Modes at one point of the box: λ (k,) [1/s], residual (k,) of the full problem (scaled, both sides' larger one),
     error (k,) estimated of λ, relative, of the problem that the model holds: where other nodes touch, modes are others
-    (`ReducedModel.unlike`); passed (k,): whether that is below the bound asked for. point: the values of the parameters; inside: whether they lie in the box. right, left (r, k) are the vectors on the basis. still
-    [1/s]: up to which |λ| they may be motions as a whole; top [1/s]: up to where they were solved for."""
+    (`ReducedModel.unlike`); passed (k,): whether that is below the bound asked for. point: the values of the
+    parameters; inside: whether they lie in the box. right, left (r, k) are the vectors on the basis. still [1/s]: up to
+    which |λ| they may be motions as a whole; top [1/s]: up to where they were solved for."""
 
     point: Mapping[str, float]
     values: ComplexArray
