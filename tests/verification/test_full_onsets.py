@@ -25,7 +25,7 @@ from stridor.modal.full import words
 from stridor.modal.full.counted import Counted, Passing
 from stridor.modal.full.family import Family, Smooth, family_of
 from stridor.modal.full.search import Answer
-from stridor.modal.newton import Border
+from stridor.modal.newton import Border, standstill
 from stridor.modal.onsets import onsets
 from stridor.modal.options import Options
 from stridor.modal.quadratic import Quadratic
@@ -526,6 +526,22 @@ def test_divergence_beside_the_zero_of_a_free_body(
     else:
         assert onset.square_root_coefficient == pytest.approx(np.sqrt(2), rel=1e-6)
     assert found.complete, found.completeness
+
+
+@pytest.mark.parametrize("off", [1e-6, 1e-9, 1e-12])
+def test_the_slope_of_divergence_beside_a_free_body_from_a_guess_close_by(off: float):
+    """The same two masses: λ = (2μ − 2)/c to first order, however near to μ = 1 the guess is."""
+    c, pair, drive = 0.03, np.array([[1.0, -1.0], [-1.0, 1.0]]), np.array([[0.0, 0.0], [2.0, -2.0]])
+
+    def at(mu: float) -> Quadratic:
+        return Quadratic(*(sp.csr_array(m) for m in (ONE, c * ONE, pair + mu * drive)))
+
+    x, y = np.array([1.0, 1.0 + 1e-9], dtype=complex), np.array([1.0, -1.0], dtype=complex)
+    between = 1 - 3 * off, 1 + 3 * off
+    root = standstill(Family((0.0, 1.7), at, Options()), 1 + off, x, y, between)
+    assert root is not None
+    assert root.mu == pytest.approx(1.0, rel=1e-12)
+    assert root.slope == pytest.approx(2 / c, rel=1e-6)
 
 
 @pytest.mark.parametrize("damping", [0.0, 4e-4])

@@ -36,6 +36,7 @@ IDLE = 3
 MET = 1e-8  # relative step at which a complex meeting is settled, if no further one is shorter
 ROUNDING = 1e-10  # |Re λ| / |λ| that may be left of slow modes of stiff structures
 RESTS = 1e-13  # backward error of λ = 0 that is rounding of the stiffness, as files of fourteen digits leave it
+DIFFERENCE = 1e-6  # of the range: to either side of an onset, for a slope
 TOO_LARGE = 1e8  # times its entry at the border, of a vector there
 FLAT = 1e-9  # dRe λ/dμ times the range, over |λ|, below which friction has no say in it
 
@@ -368,6 +369,10 @@ def _beside_zero(border: Border, mu: float, between: tuple[float, float], zeros:
             if settled:
                 break
         series, here = border.series(mu), border.at(0.0, mu)
+        # Of the last secant rounding makes anything.
+        beside = DIFFERENCE * (problem.high - problem.low)
+        one, other = max(mu - beside, problem.low), min(mu + beside, problem.high)
+        rate = float((border.series(other) - border.series(one))[zeros].real) / (other - one)
     except AnalysisError:
         return None
     more = float(series[zeros + (2 if problem.reversible else 1)].real)
