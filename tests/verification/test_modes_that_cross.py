@@ -40,7 +40,7 @@ def test_they_are_no_onsets_of_receptances(crossing: System, end: float) -> None
 
 
 def test_growth_that_ends_must_have_begun(crossing: System, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(receptance_onsets, "beyond_rounding", lambda changes: range(len(changes)))
+    monkeypatch.setattr(receptance_onsets, "beyond_rounding", lambda changes, _: range(len(changes)))
     found = onsets_of_band(crossing, (0.0, 0.5), 5.0, options=Options(source="receptance"))
     assert [o.stabilising for o in found.onsets] == [True, False]
     assert "growth of a mode that did not grow is said to end at μ = 0.39393939" in found.completeness
@@ -54,19 +54,24 @@ def onset(mu: float, *, stabilising: bool, square_root: float = 8e-5) -> Onset:
     )  # fmt: skip
 
 
+def quiet(mu: float) -> np.ndarray:
+    """λ at μ: of undamped modes rounding may make them grow in between."""
+    return np.array([1e-6 + 2.827j])
+
+
 @pytest.mark.parametrize("ends_first", [True, False])
 def test_either_may_be_the_first(ends_first: bool) -> None:
     begins, ends = (onset(0.4 + 1.5e-10 * (stops != ends_first), stabilising=stops) for stops in (False, True))
-    assert within_rounding([begins, ends]) == {0, 1}
+    assert within_rounding([begins, ends], quiet) == {0, 1}
     # Each was found at both branches but the last, which Newton's method found at one.
     changes = [StabilityChange(o.mu, (1, 2), o) for o in (begins, begins, ends)]
     lost = StabilityChange(0.4, (1, 2), None)
-    assert beyond_rounding([*changes, lost]) == [3]
+    assert beyond_rounding([*changes, lost], quiet) == [3]
 
 
 def test_what_grows_by_more_stays() -> None:
     """κ√Δμ = 1e-4 1/s at 0.45 Hz is more than rounding, and so is what only begins."""
     begins, ends = onset(0.4, stabilising=False, square_root=10.0), onset(0.4 + 1e-10, stabilising=True)
-    assert not within_rounding([begins, ends])
-    assert not within_rounding([begins, replace(ends, branches=(2, 4))])
-    assert not within_rounding([begins])
+    assert not within_rounding([begins, ends], quiet)
+    assert not within_rounding([begins, replace(ends, branches=(2, 4))], quiet)
+    assert not within_rounding([begins], quiet)
