@@ -160,3 +160,17 @@ def test_a_sweep_that_hits_the_meeting_gives_the_same_names(source):
     for mus in ([2 * meeting], [0.5 * meeting, meeting, 2 * meeting]):
         found = complex_modes(system, mus, max_frequency_hz=10e3, source=source)
         assert found.branch[found.unstable[-1]].tolist() == [8]
+
+
+def test_one_body_without_damping():
+    """By a reduced model, too: modes that no damping holds are looked at at the low end with their vectors."""
+    case = st.loads(template_text("two-beams")).with_({
+        "bodies.beam1.elements": 8, "bodies.beam2.elements": 10, "modal.max_frequency_hz": 20e3,
+        "bodies.beam2.damping": {"mass": 0.0, "stiffness": 0.0},
+    })  # fmt: skip
+    system = st.build_system(case)
+    lists = [onsets_of_band(system, (0.0, 1.0), 20e3, options=Options(source=s)) for s in ("receptance", "reduced")]
+    assert len(lists[0]) > 2
+    assert [o.mu for o in lists[1]] == pytest.approx([o.mu for o in lists[0]], rel=1e-9)
+    assert lists[0].complete
+    assert lists[1].complete

@@ -19,6 +19,7 @@ from ...threads import one_thread
 from ...typing import Array
 from ..onset import Onsets
 from ..options import Options
+from ..quadratic import RegionModes
 from ..quadratic.dense import unit
 from ..quadratic.inverse_iteration import solved_beside
 from ..quadratic.reach import searched
@@ -73,7 +74,8 @@ def reduced_onsets(
     top = searched(family.built(high), 2 * np.pi * max_frequency_hz)
     source = _model(family, beyond * top / BEYOND, max_frequency_hz)
     small = Family((family.low, family.high), lambda mu: source.sparse(mu - family.low), options)
-    ends = ends_of(small, low, high, top)
+    first, last = ends_of(small, low, high, top)
+    ends = _lifted(source, first, low), _lifted(source, last, high)
     answer = search(family, [lambda: source], (low, high), ends, top)
     at_start, at_end = (tuple(end.values[unstable(family, end.values, top)].tolist()) for end in ends)
     return Onsets(
@@ -81,6 +83,14 @@ def reduced_onsets(
         at_end=at_end, entering=answer.entering, contact_state=family.contacts.contact_state,
         unexplained=0 if answer.vouched else max(len(answer.lacks), 1),
     )  # fmt: skip
+
+
+def _lifted(source: Projected, end: RegionModes, mu: float) -> RegionModes:
+    """Modes of the reduced model at μ, their vectors those of the full problem."""
+    if end.left is None or not len(end.right):
+        return end
+    t = mu - source.family.low
+    return replace(end, right=source.vectors(end.right, t), left=source.vectors(end.left, t, left=True))
 
 
 def _model(family: SystemFamily, top: float, band_hz: float) -> Projected:
