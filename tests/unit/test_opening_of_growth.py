@@ -284,7 +284,7 @@ def test_an_opening_that_is_lost_is_missed(g: float, tmp_path: Path, monkeypatch
 
 @pytest.mark.parametrize("seen", [True, False])
 def test_an_opening_that_is_none_is_noticed(seen: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A mode that decays, said to grow."""
+    """A mode that decays, said to grow: the count finds the one that does, and what was said is left out."""
 
     def lying(family: Family, lam: complex, *vectors: np.ndarray) -> Opening | None:
         one = told(family, lam, *vectors)
@@ -299,8 +299,9 @@ def test_an_opening_that_is_none_is_noticed(seen: bool, tmp_path: Path, monkeypa
     if seen:
         monkeypatch.setattr(basis.Along, "_seen", lambda *_: True)
     found = st.onsets(matrix_case(tmp_path, circulatory(0.3), 1.0, (0.0, 0.5)))
-    assert found.complete is not seen
-    assert len(found.onsets) == 1 + seen
+    assert found.complete
+    assert [(o.mu, o.frequency_hz) for o in found.onsets] == [(0.0, pytest.approx(1 / np.pi, rel=1e-9))]
+    assert ("branches not followed" in found.completeness) is seen
 
 
 def test_a_range_that_begins_where_growth_is_still_rounding(tmp_path: Path) -> None:
