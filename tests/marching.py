@@ -10,6 +10,7 @@ import pytest
 import scipy.signal
 import scipy.sparse as sp
 
+import stridor as st
 from stridor.contact.interface import Contact, Rows
 from stridor.fe.assembly import assemble_beam
 from stridor.fe.beam import BeamElement, BeamMesh
@@ -30,6 +31,20 @@ def in_chunks(patch: pytest.MonkeyPatch, steps: int) -> None:
     """Every march in chunks of so many steps, told after each."""
     patch.setattr(march.Pace, "begin", lambda _: steps)
     patch.setattr(march, "TOLD_SECONDS", -1.0)
+
+
+def cut(case: st.Case, steps: int, share: float = 0.6) -> st.Trajectory:
+    """The run of a case, told after so many steps each, that Ctrl-C ends behind a share of it."""
+
+    def stop(done: int, planned: int) -> None:
+        if done > share * planned:
+            raise KeyboardInterrupt
+
+    with pytest.MonkeyPatch.context() as patch:
+        in_chunks(patch, steps)
+        part = st.simulate(case, progress=stop)
+    assert part.interrupted
+    return part
 
 
 def touch(normal, tangent, *, gap=0.0, slip=0.0, law=None, name="A", motions=0) -> Contact:

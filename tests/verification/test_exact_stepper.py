@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import stridor as st
-from marching import belt_motion, block_on_belt, in_chunks, points_of, run, touch
+from marching import belt_motion, block_on_belt, cut, in_chunks, points_of, run, touch
 from mode_coupling import mode_coupling
 from random_contacts import random_system
 from stridor.case import template_text
@@ -743,18 +743,11 @@ def test_the_bench_from_rest_as_in_explicit_steps(contact: str):
     assert result.path == "exact"
 
 
-def test_a_run_that_is_cut_goes_on_to_the_last_digit(monkeypatch: pytest.MonkeyPatch, tmp_path):
+def test_a_run_that_is_cut_goes_on_to_the_last_digit(tmp_path):
     case = st.loads(template_text("two-beams")).with_(SHORT | {"temporal.stepper": "exact"})
     whole = st.simulate(case)
 
-    def stop(done: int, planned: int) -> None:
-        if done > 0.6 * planned:
-            raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        in_chunks(patch, 777)
-        part = st.simulate(case, progress=stop)
-    assert part.interrupted
+    part = cut(case, 777)
     saved = st.open(st.save(part, tmp_path / "part.nc"))
     again = st.simulate(case, restart=saved)
     for name in ("time", "normal_force", "displacement", "status", "kinetic"):

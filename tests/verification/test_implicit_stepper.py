@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import stridor as st
-from marching import belt_motion, block_on_belt, in_chunks, points_of, run, touch
+from marching import belt_motion, block_on_belt, cut, points_of, run, touch
 from mode_coupling import mode_coupling
 from random_contacts import random_system
 from solid_cases import DOYEN, WALL
@@ -524,20 +524,13 @@ def test_friction_that_falls_with_speed_feeds_a_motion():
     assert rate == pytest.approx(growth, rel=0.01)
 
 
-def test_a_run_that_is_cut_goes_on_to_the_last_digit(monkeypatch: pytest.MonkeyPatch, tmp_path):
+def test_a_run_that_is_cut_goes_on_to_the_last_digit(tmp_path):
     case = st.loads(template_text("two-beams")).with_(
         SHORT | {"temporal.stepper": "implicit", "temporal.step": 1e-6, "temporal.record_every": 3}
     )
     whole = st.simulate(case)
 
-    def stop(done: int, planned: int) -> None:
-        if done > 0.6 * planned:
-            raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        in_chunks(patch, 77)
-        part = st.simulate(case, progress=stop)
-    assert part.interrupted
+    part = cut(case, 77)
     saved = st.open(st.save(part, tmp_path / "part.nc"))
     again = st.simulate(case, restart=saved)
     for name in ("time", "normal_force", "displacement", "acceleration", "status", "kinetic"):
@@ -548,7 +541,7 @@ def test_a_run_that_is_cut_goes_on_to_the_last_digit(monkeypatch: pytest.MonkeyP
     assert np.abs(changed.displacement[len(part.time)] - whole.displacement[len(part.time)]).max() < 1e-9
 
 
-def test_nodes_that_part_and_strike_go_on_to_the_last_digit(monkeypatch: pytest.MonkeyPatch, tmp_path):
+def test_nodes_that_part_and_strike_go_on_to_the_last_digit(tmp_path):
     """Which nodes have a place in the operator that is swept hangs on what went before; what comes out does not."""
     case = pad()
     whole = st.simulate(case)
@@ -558,13 +551,7 @@ def test_nodes_that_part_and_strike_go_on_to_the_last_digit(monkeypatch: pytest.
     calm = st.simulate(pad(**{"temporal.perturbation": 1e-6}))
     assert "nodes part" not in calm.path_reason
 
-    def stop(done: int, planned: int) -> None:
-        if done > 0.6 * planned:
-            raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        in_chunks(patch, 7)
-        part = st.simulate(case, progress=stop)
+    part = cut(case, 7)
     again = st.simulate(case, restart=st.open(st.save(part, tmp_path / "part.nc")))
     for name in ("time", "normal_force", "displacement", "status", "kinetic"):
         assert np.array_equal(getattr(again, name), getattr(whole, name)), name

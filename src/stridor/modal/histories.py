@@ -66,22 +66,22 @@ class Entries:
     ) -> None:
         """Take note of the eigenvalues old (k,) and new (k,) of branches (k,) at two neighbouring μ."""
         step = between[1] - between[0]
-        grew, growing = (v.real > UNSTABLE_RELATIVE * np.abs(v) for v in (old, new))
+        rates = np.array([v.real / np.maximum(np.abs(v), 1e-300) for v in (old, new)])
+        grew, growing = rates > UNSTABLE_RELATIVE
         began = np.flatnonzero(~grew & growing)
         for i in np.flatnonzero(grew & ~growing).tolist() if len(began) else ():
             k = int(began[np.argmin(np.abs(new[began] - old[i]))])
             if abs(new[k].imag - old[i].imag) <= ALIKE * abs(old[i]):
                 self.handed.setdefault(int(branch[i]), []).append(_HandOver(*between, int(branch[k])))
         for i in np.flatnonzero((old.imag > self.top) != (new.imag > self.top)).tolist():
-            growth = [float(v.real) / max(abs(v), 1e-300) for v in (old[i], new[i])]
-            grows, up = max(growth) > UNSTABLE_RELATIVE, new[i].imag > self.top
+            grows, up = bool(grew[i] or growing[i]), new[i].imag > self.top
             if not up:
                 part = float((old.imag[i] - self.top) / (old.imag[i] - new.imag[i]))
                 entry = _Entry(*between, between[0] + part * step, grows)
                 self.found.setdefault(int(branch[i]), []).append(entry)
             if not grows:
                 continue
-            least = 2 if min(growth) > SPLIT_RELATIVE else 0
+            least = 2 if rates[:, i].min() > SPLIT_RELATIVE else 0
             self.passed.append(AtTop(*between, *((least, 2) if up else (-2, -least))))
 
     def after(self, branches: Iterable[int], mu: float, changes: Sequence[StabilityChange] = ()) -> float | None:

@@ -10,7 +10,8 @@ import numpy as np
 
 from ....errors import AnalysisError
 from ....typing import Array
-from .statuses import BACKWARD, FORWARD, GAP, ROUNDING, STICK, Driven, Pairs, Status, sense, spans
+from .held import ROUNDING, spans
+from .statuses import BACKWARD, FORWARD, GAP, STICK, Driven, Pairs, Status, sense
 
 CLOSE = 1e-9  # of the forces at hand: how far off a condition rounding may be
 MOST = 4**6  # combinations that are tried

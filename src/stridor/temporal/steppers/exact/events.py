@@ -15,7 +15,8 @@ from ....typing import Array, IntArray
 from ...arithmetic import FAST
 from ...columns import FRICTION, NORMAL, SUPPORT
 from .decisions import CLOSE, MOST
-from .statuses import BACKWARD, FORWARD, GAP, NEAR, ROUNDING, STICK
+from .held import NEAR, ROUNDING
+from .statuses import BACKWARD, FORWARD, GAP, STICK
 from .sums import dot
 from .tables import FORCES, GAPS, JAMMED, OPENING_RATE, OPENINGS, SLIP_RATE, WAYS, matrix
 

@@ -15,9 +15,10 @@ from ....typing import Array, IntArray
 from ...columns import FIRST_OPEN, FIRST_STICK, OPEN_STEPS, SLIP_STEPS, STICK_STEPS, WORKS
 from .events import DONE, LEFT, Bench, go_through, powers
 from .forms import FORMS
+from .held import NEAR
 from .observed import Course, Records, extremes, record
 from .search import CROSSED, UNDECIDED, Numbers, Parts, first_root
-from .statuses import GAP, NEAR, STICK, TAYLOR
+from .statuses import GAP, STICK, TAYLOR
 from .sums import followed, forms_at, modes_at, product, slow_at
 from .tables import (
     AMOUNTS,

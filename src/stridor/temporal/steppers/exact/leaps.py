@@ -8,6 +8,7 @@ from ....errors import AnalysisError
 from ....typing import Array
 from .events import MEANING, Bench
 from .forms import forms_of
+from .held import spans
 from .leap import (
     CHANGE,
     CONTACT,
@@ -43,7 +44,7 @@ from .motion import UNTOLD, Anchor, Motion, Watched
 from .observed import Records
 from .outputs import Outputs
 from .search import planes
-from .statuses import Status, spans
+from .statuses import Status
 from .tables import JAMMED, LEG, OPTION, UNKNOWN, Store, leg_parts, option_parts
 
 

@@ -13,24 +13,10 @@ from ...columns import FRICTION, NORMAL, SUPPORT, WORKS
 from ..basis import Basis
 from .decisions import CLOSE, EventState, Impact, Touching, choices, consistent_status, impact, landing
 from .drive import Piece
+from .held import NEAR, ROUNDING
 from .leap import MOMENT, PLAIN, STRETCH
 from .search import CROSSED, UNDECIDED, Numbers, Parts, first_root, numbers_of, parts_of, planes
-from .statuses import (
-    BACKWARD,
-    FORWARD,
-    GAP,
-    NEAR,
-    ROUNDING,
-    STICK,
-    TAYLOR,
-    Driven,
-    Flow,
-    Pairs,
-    Regime,
-    Row,
-    Status,
-    sense,
-)
+from .statuses import BACKWARD, FORWARD, GAP, STICK, TAYLOR, Driven, Flow, Pairs, Regime, Row, Status, sense
 
 UNTOLD = (
     "a force, gap or slip of a contact stays so close to zero that no change of status can be told from rounding, "

@@ -15,27 +15,23 @@ keeps what it had as slip ended, and where there was no slip before, and normals
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy.linalg as sl
-import scipy.optimize as so
 
 from ....errors import AnalysisError
 from ....typing import Array, ComplexArray
 from ..basis import Basis
 from .drive import Piece
+from .held import HELD, NEAR, spans, turns
 
 GAP, STICK, FORWARD, BACKWARD = range(4)  # a slave that slips moves along the tangent, or against it
 Status = tuple[int, ...]
 SLOW = 1e-7  # of the fastest mode: what is slower is one small system, moved on by its Taylor series
 RAMP = 3.0  # rad over a ramp: likewise
 TAYLOR = 24  # terms of that series
-HELD = 1e-9  # of a row: what is left of it where contacts leave it no motion
-ROUNDING = 1e-12  # of the terms of a number
-NEAR = 1e-8  # of a ramp: what turns there has turned
 JAMMED = 1e-9
 DEFECTIVE = 1e4  # condition of a mode by whose square rounding grows: balances then still close to 1e-8
 
@@ -76,42 +72,6 @@ class Pairs:
             rest = self.tangent[c] - others.T @ np.linalg.lstsq(others.T, self.tangent[c], rcond=None)[0]
             found.append(bool(np.linalg.norm(rest) <= HELD * np.linalg.norm(self.tangent[c])))
         return tuple(found)
-
-
-def spans(rows: Array, row: Array) -> bool:
-    """Whether a row (k,) is a combination of others (r, k), which are independent."""
-    base = sl.qr(rows.T, mode="economic")[0] if len(rows) else np.zeros((len(row), 0))
-    return bool(np.linalg.norm(row - base @ (base.T @ row)) <= HELD * np.linalg.norm(row))
-
-
-def turns(polynomial: Array, amounts: Array) -> tuple[float, list[float]]:
-    """The sign of a polynomial (T,) right behind 0, which is 0 where all of it is rounding of its ``amounts`` (T,), and
-    where between 0 and 1 it changes."""
-    kept = np.where(np.abs(polynomial) > ROUNDING * amounts, polynomial, 0.0)
-    if not np.any(kept):
-        return 0.0, []
-    order = np.arange(len(kept))
-
-    def value(x: float) -> float:
-        return float(kept @ x**order)
-
-    # What a root of several is split into is as close to zero between them as rounding.
-    inside = np.roots(kept[::-1]).real
-    edges = np.concatenate([[0.0], np.sort(inside[(inside > 0.0) & (inside < 1.0)]), [1.0]])
-    signs: list[tuple[float, float]] = []
-    for low, high in itertools.pairwise(edges):
-        middle = 0.5 * (low + high)
-        there = value(middle)
-        if high - low > NEAR and abs(there) > ROUNDING * float(amounts @ middle**order):
-            signs.append((middle, float(np.sign(there))))
-    if not signs:
-        return 0.0, []
-    found = [
-        float(so.brentq(value, here, there, xtol=1e-15))
-        for (here, now), (there, then) in itertools.pairwise(signs)
-        if now != then
-    ]
-    return signs[0][1], found
 
 
 def sense(status: int) -> float:
