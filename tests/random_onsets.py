@@ -151,13 +151,20 @@ def _pressed(system: System, mu: float) -> np.ndarray:
 
 
 def _belt(name: str, rng: np.random.Generator) -> Problem:
-    """Masses under a belt, a contact each to three of them; damping light, heavy or none."""
+    """Masses under a belt; damping light, heavy or none."""
+    system, top = belt(rng, kind=None)
+    return _of_system(name, system, float(rng.uniform(0.3, 1.2)), top, damped=True)
+
+
+def belt(rng: np.random.Generator, *, kind: int | None) -> tuple[System, float]:
+    """Masses under a belt, a contact each to three of them, and the angular frequency of a band; kind of the damping: 0
+    none, 1 light, 2 of many sizes, 3 heavy."""
     n, m = int(rng.integers(3, 10)), int(rng.integers(1, 4))
     shapes = rng.standard_normal((n, n))
     stiffness = shapes.T @ np.diag(np.exp(rng.uniform(-1.0, 2.5, n))) @ shapes
     mass = np.diag(rng.uniform(0.5, 2.0, n))
     rows = rng.standard_normal((n, n))
-    kind = rng.integers(4)
+    kind = int(rng.integers(4)) if kind is None else kind
     damping = (
         np.zeros((n, n)),
         0.02 * mass + 1e-3 * stiffness,
@@ -168,8 +175,7 @@ def _belt(name: str, rng: np.random.Generator) -> Problem:
     contact = np.exp(rng.uniform(0, 4, m))
     contact[rng.random(m) < 0.2] = np.inf
     system = by_hand(mass, damping, stiffness, normal, tangent, contact)
-    top = float(rng.uniform(0.4, 3.0) * np.sqrt(np.linalg.norm(stiffness, 2) / 0.5))
-    return _of_system(name, system, float(rng.uniform(0.3, 1.2)), top, damped=True)
+    return system, float(rng.uniform(0.4, 3.0) * np.sqrt(np.linalg.norm(stiffness, 2) / 0.5))
 
 
 def _of_matrices(name: str, terms: list, high: float, top: float) -> Problem:

@@ -1,4 +1,5 @@
-"""The check of followed modes: what grows in the band is sought anew, and what branches do not lead to is added."""
+"""The check of followed modes: what grows in the band is sought anew, of small systems what decays as well, and what
+branches do not lead to is added."""
 
 from __future__ import annotations
 
@@ -8,8 +9,9 @@ import numpy as np
 
 from ..errors import AnalysisError
 from ..system import System
-from ..typing import Array, IntArray
+from ..typing import Array, ComplexArray, IntArray
 from .complex_modes import complex_modes
+from .decaying import Decaying, decaying_modes, unlisted
 from .growing import SAME, UNCHECKED, WIDER, Growing, affordable, growing_modes, missing, too_large, unconfirmed
 from .krylov.problem import problem_of
 from .options import Options
@@ -32,7 +34,8 @@ def checked_modes(
 
     modes: all that start in the band at μ = 0, as `complex_modes` gives them with ``max_frequency_hz``. Up to five
     friction coefficients are all checked, of more the ends and ``own``. What lacks is followed from further above;
-    what cannot be followed at all gets a column of its own, NaN at other μ.
+    what cannot be followed at all gets a column of its own, NaN at other μ. What decays and no branch leads to gets
+    one as well where `decaying_modes` can tell, if all are checked.
     """
     options = options or Options()
     if not affordable(system):
@@ -56,11 +59,21 @@ def checked_modes(
         further = _followed_from(system, modes, wider, max_frequency_hz, options)
         modes = modes if further is None else further
     modes, alone = _with_columns(system, modes, found, touching, options)
-    told = tuple(
+    told = [
         _sentence(modes, row, found.get(row), max_frequency_hz, began, alone.get(row, 0))
         for row in range(len(modes.mu))
-    )
-    return replace(modes, completeness=told)
+    ]
+    for row in chosen:
+        growing = found[row]
+        if isinstance(growing, Growing):
+            decaying = None
+            if len(chosen) == len(modes.mu):
+                decaying = decaying_modes(
+                    system, growing, max_frequency_hz, touching_at=touching, damped=modes.damped, options=options
+                )
+            modes, lacked = _with_decaying(modes, row, decaying, growing.top)
+            told[row] += f" {_of_decaying(decaying, lacked, max_frequency_hz)}"
+    return replace(modes, completeness=tuple(told))
 
 
 def _rows(mu: Array, own: float | None) -> list[int]:
@@ -116,8 +129,35 @@ def _with_columns(
         alone[row] = len(indices)
         problem = problem_of(system if modes.damped else system.undamped(), touching, options)
         whole = problem.pencil(growing.mu).condensed()
-        modes = _widened(modes, row, _sharpened(whole, growing, indices, options.solver), indices)
+        sharp = _sharpened(whole, growing, indices, options.solver)
+        modes = _widened(modes, row, sharp.values[indices], sharp.right[:, indices], sharp.residual[indices])
     return modes, alone
+
+
+def _with_decaying(modes: ComplexModes, row: int, found: Decaying | None, top: float) -> tuple[ComplexModes, int]:
+    """With a column for each decaying mode that no branch leads to, and how many those are."""
+    if found is None:
+        return modes, 0
+    at = unlisted(found, modes.eigenvalues[row], top)
+    if len(at):
+        before = modes.frequency_hz[row]
+        modes = _widened(modes, row, found.values[at], found.right[:, at], found.residual[at], found.left[:, at])
+        # The lowest modes are listed first, whatever their numbers.
+        higher = [np.flatnonzero(before > f) for f in found.values[at].imag / (2 * np.pi)]
+        place = [h[0] if len(h) else len(before) for h in higher]
+        modes = modes.chosen(np.insert(np.arange(len(before)), place, len(before) + np.arange(len(at))))
+    return modes, len(at)
+
+
+def _of_decaying(found: Decaying | None, lacked: int, max_frequency_hz: float) -> str:
+    """What is known of the modes of the list that decay."""
+    if found is None:
+        return (
+            f"Of modes that decay those are listed that start up to {max_frequency_hz:g} Hz or a little above at μ = 0;"
+            ' source "full" seeks all.'
+        )
+    led = f"; to {lacked} of them no branch from μ = 0 was seen to lead" if lacked else ""
+    return f"Modes that decay at less than {found.slower:.4g} 1/s were sought as well, and all are counted{led}."
 
 
 def _sharpened(problem: Quadratic, found: Growing, indices: IntArray, solver: str | None) -> Growing:
@@ -138,26 +178,31 @@ def _sharpened(problem: Quadratic, found: Growing, indices: IntArray, solver: st
     return replace(found, values=values, right=right, residual=residual)
 
 
-def _widened(modes: ComplexModes, row: int, found: Growing, indices: IntArray) -> ComplexModes:
-    """With columns that hold eigenvalues at one μ alone."""
-    shape = (len(modes.mu), len(indices))
-    values, residual = np.full(shape, complex(np.nan, np.nan)), np.full(shape, np.nan)
-    values[row], residual[row] = found.values[indices], found.residual[indices]
-    right = left = None
-    if modes.right is not None:
-        shapes = np.full((*shape, modes.right.shape[2]), complex(np.nan, np.nan))
-        shapes[row] = found.right[:, indices].T
-        right = np.concatenate([modes.right, shapes], axis=1)
-    if modes.left is not None:
-        left = np.concatenate([modes.left, np.full((*shape, modes.left.shape[2]), complex(np.nan, np.nan))], axis=1)
+def _widened(
+    modes: ComplexModes, row: int, values: ComplexArray, right: ComplexArray, residual: Array,
+    left: ComplexArray | None = None,
+) -> ComplexModes:  # fmt: skip
+    """With columns that hold these eigenvalues (k,) at one μ alone, and nothing at others."""
+    shape = (len(modes.mu), len(values))
+    eigenvalues, errors = np.full(shape, complex(np.nan, np.nan)), np.full(shape, np.nan)
+    eigenvalues[row], errors[row] = values, residual
+
+    def with_shapes(known: ComplexArray | None, vectors: ComplexArray | None) -> ComplexArray | None:
+        if known is None:
+            return None
+        shapes = np.full((*shape, known.shape[2]), complex(np.nan, np.nan))
+        if vectors is not None:
+            shapes[row] = vectors.T
+        return np.concatenate([known, shapes], axis=1)
+
     most = int(modes.branch.max(initial=0))
     return replace(
         modes,
-        eigenvalues=np.concatenate([modes.eigenvalues, values], axis=1),
-        residual=np.concatenate([modes.residual, residual], axis=1),
-        branch=np.concatenate([modes.branch, most + 1 + np.arange(len(indices))]),
-        right=right,
-        left=left,
+        eigenvalues=np.concatenate([modes.eigenvalues, eigenvalues], axis=1),
+        residual=np.concatenate([modes.residual, errors], axis=1),
+        branch=np.concatenate([modes.branch, most + 1 + np.arange(len(values))]),
+        right=with_shapes(modes.right, right),
+        left=with_shapes(modes.left, left),
     )
 
 
