@@ -122,8 +122,10 @@ def test_what_comes_and_goes_has_an_onset_with_where_it_enters_and_an_end():
 def test_what_is_said_of_it():
     assert NOT_LOOKED.words == ""
     assert Between(11).words == " As many roots grow at each of 11 further values as the onsets say."
-    said = " At 2 of 11 further values other numbers of roots grow than the onsets say, and branches lead to each of these."
-    assert Between(11, odd=2).words == said
+    assert not Between(11).amiss
+    said = "at {} values looked at between them other numbers of roots grow than the onsets say"
+    assert Between(11, odd=2).amiss == [said.format("2 of 11")]
+    assert Between(11, odd=11).amiss == [said.format("all 11")]
 
 
 def left_by_the_end(seed: int) -> int:

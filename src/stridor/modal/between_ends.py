@@ -39,20 +39,16 @@ class Between:
 
     @property
     def words(self) -> str:
-        """A sentence where branches lead to all that was found, "" where nothing was looked at."""
-        if not self.looked:
-            return ""
-        if not self.odd:
-            return f" As many roots grow at each of {self.looked} further values as the onsets say."
-        where = f"At {self.odd} of {self.looked} further values"
-        return f" {where} other numbers of roots grow than the onsets say, and branches lead to each of these."
+        """A sentence where the onsets account for all that was found, "" where nothing was looked at."""
+        return f" As many roots grow at each of {self.looked} further values as the onsets say." if self.looked else ""
 
     @property
     def amiss(self) -> list[str]:
-        """What is wrong where the onsets account for what grows at no value that was looked at."""
-        if not self.looked or self.odd < self.looked:
+        """What is wrong where the onsets do not account for what grows, though branches lead to it."""
+        if not self.odd:
             return []
-        return [f"at all {self.looked} values looked at between them other numbers of roots grow than the onsets say"]
+        where = f"all {self.looked}" if self.odd == self.looked else f"{self.odd} of {self.looked}"
+        return [f"at {where} values looked at between them other numbers of roots grow than the onsets say"]
 
 
 NOT_LOOKED = Between(0)
