@@ -3,14 +3,20 @@ couples them with different signs grow in an island as narrow as the coupling is
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.linalg as sl
+from scipy.optimize import brentq
 
 import stridor as st
+from benches import full_eigenvalues
 from stridor.modal.full import search
+from stridor.modal.options import Options
+from stridor.modal.over_friction import onsets_of_band
+from stridor.system import System
 
 pytestmark = pytest.mark.verification
 
@@ -113,3 +119,50 @@ def test_how_closely_that_was_looked_at_is_said(tmp_path: Path, monkeypatch: pyt
         "Between the ends nothing was counted: growth that begins and ends again, or ends and begins, within one of the "
         "steps may be missing."
     )
+
+
+def passing_pair(seed: int) -> tuple[System, float, float]:
+    """A contact whose friction takes a mode past another, lightly damped, and where they pass and how far about they are
+    one: K + k_c n nᵀ − μ k_c t nᵀ with n = (1, e, …), t = (τ, δ, …), squares equal at μ₀, growth where
+    |μ − μ₀| < 2 √(e (1 − μ₀τ) (μ₀δ − e)) / τ without damping."""
+    rng = np.random.default_rng([seed, 71])
+    n, weak, turn, side = int(rng.integers(2, 7)), float(10 ** rng.uniform(-6, -2.5)), float(rng.uniform(0.5, 0.9)), 1.0
+    squares = np.concatenate([[4.0, 0.0], rng.uniform(9.0, 30.0, n - 2)])
+    place = float(rng.uniform(0.15, 0.85))
+    squares[1] = 4.0 + 1.0 - place * turn
+    normal, tangent = weak * rng.standard_normal((2, n))
+    normal[:2], tangent[:2] = (1.0, weak), (turn, side)
+    width = 2 * np.sqrt(weak * (1 - place * turn) * place * side) / turn
+    growth = np.sqrt(weak * (1 - place * turn) * place * side) / (2 * np.sqrt(squares[1]))
+    damping = 2 * growth * float(10 ** rng.uniform(-4, -0.3)) * np.diag(rng.uniform(0.5, 1.0, n))
+    contact = {"normal": normal, "tangent": tangent, "stiffness": 1.0, "slip": 1.0, "friction": {"law": "coulomb", "coefficient": 0.3}}
+    return System.from_matrices(np.eye(n), damping, np.diag(squares), contacts={"c": contact}), place, width
+
+
+def ends_of_growth(system: System, place: float, width: float) -> list[float]:
+    """Where growth begins and ends about a place, by dense eigenvalues."""
+
+    def growth(mu: float) -> float:
+        return float(full_eigenvalues(system, mu).real.max())
+
+    grid = np.linspace(place - 3 * width, place + 3 * width, 241)
+    rates = [growth(mu) for mu in grid]
+    return [brentq(growth, a, b, xtol=1e-14) for (a, b), (r, s) in zip(pairwise(grid), pairwise(rates), strict=True) if r * s < 0]
+
+
+@pytest.mark.parametrize("source", ["krylov", "reduced", "receptance"])
+@pytest.mark.parametrize("seeds", [range(8), pytest.param(range(8, 300), marks=pytest.mark.slow)], ids=["few", "many"])
+def test_damped_modes_that_pass_each_other_grow_in_between(seeds: range, source: str) -> None:
+    whole = 0
+    for seed in seeds:
+        system, place, width = passing_pair(seed)
+        expected = ends_of_growth(system, place, width)
+        assert len(expected) == 2, f"seed {seed}: {expected} about {place}"
+        found = onsets_of_band(system, (0.0, 1.0), 1.0, options=Options(source=source))
+        if not found.complete:
+            continue
+        whole += 1
+        said = [o.mu for o in found]
+        assert said == pytest.approx(expected, abs=1e-3 * width + 1e-9), f"seed {seed}, about {width:.1e} wide"
+        assert [o.stabilising for o in found] == [False, True]
+    assert whole >= 0.9 * len(seeds)

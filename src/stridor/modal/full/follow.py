@@ -10,7 +10,9 @@ import numpy as np
 from ...errors import AnalysisError
 from ..histories import Entries
 from ..krylov.follow import BranchState, Follower
+from ..krylov.islands import islands
 from ..krylov.passages import Passage, crossings, meetings
+from .basis import DENSE as SMALL
 from .basis import Along
 from .foretold import changes_within
 
@@ -91,6 +93,8 @@ def followed(source: Along, low: float, high: float, top: float, finer: int = 1)
 
     def watch(old: BranchState, new: BranchState) -> None:
         passages.extend(meetings(source, old, new) if family.reversible else crossings(old, new))
+        if not source.whole or family.size <= SMALL:  # each look is a full solve where there is no basis
+            passages.extend(islands(source, old, new))
         entries.watch((family.low + old.mu, family.low + new.mu), old.values, new.values, range(len(old.index)))
         sides = ((old.found, new.mu - old.mu), (new.found, old.mu - new.mu))
         if any(changes_within(family, found, step, top) for found, step in sides):

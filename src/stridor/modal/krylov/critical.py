@@ -27,6 +27,7 @@ from .crossing import NEAR_AXIS, Solved, crossing, crossing_again
 from .double import divergence, double, meeting
 from .exceptional import exceptional_point
 from .follow import BranchState, Follower
+from .islands import islands
 from .modes import samples
 from .passages import Passage
 from .passages import passages as changes
@@ -173,7 +174,7 @@ def _way(reduced: Reduced, between: tuple[float, float], top: float, numbered_at
     entries = Entries(top)
 
     def watch(old: BranchState, new: BranchState) -> None:
-        passages.extend(changes(reduced, old, new))
+        passages.extend(changes(reduced, old, new) + islands(reduced, old, new))
         entries.watch((old.mu, new.mu), old.values, new.values, range(len(old.index)))
 
     follower = Follower(reduced, start=numbered_at, longest=max(between[0] / 4, between[1] / 30))

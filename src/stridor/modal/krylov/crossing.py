@@ -10,10 +10,12 @@ import scipy
 
 from ..dense_problem import DenseProblem, Eigenpairs
 from ..newton import crossing as on_axis
+from ..tolerances import AT_REST
 from .follow import BranchState, Follower
 from .passages import Passage
 
 NEAR_AXIS = 1e-6  # of the band: below it a frequency is zero
+JUMP = 0.01  # of the growth at both ends: what is left of it where it jumps over zero
 
 
 @dataclass(frozen=True)
@@ -91,11 +93,20 @@ def _slow_crossing(reduced: DenseProblem, passage: Passage, start: BranchState) 
     def at(mu: float) -> BranchState:
         return Follower.resumed(reduced, start).advance(mu)
 
-    mu = root_between(lambda m: float(at(m).values[passage.branch].real), passage.low, passage.high)
+    def rate(mu: float) -> float:
+        return float(at(mu).values[passage.branch].real)
+
+    mu = root_between(rate, passage.low, passage.high)
     if mu is None:
         return None
     state = at(mu)
-    return mu, 1j * float(state.values[passage.branch].imag), float(state.tangents[passage.branch].real)
+    lam = complex(state.values[passage.branch])
+    # Where two modes exchange their names the growth of either jumps, and nothing begins or ends. Beside a motion
+    # as a whole what passes zero is known to the root of rounding alone.
+    least = JUMP * min(abs(rate(passage.low)), abs(rate(passage.high)))
+    if abs(lam.real) > least and abs(lam) > AT_REST * reduced.frequency:
+        return None
+    return mu, 1j * lam.imag, float(state.tangents[passage.branch].real)
 
 
 def _by_growth(reduced: DenseProblem, passage: Passage) -> tuple[float, complex, float] | None:
