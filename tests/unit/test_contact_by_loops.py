@@ -1076,14 +1076,16 @@ def test_facets_round_the_edge_of_a_boundary_take_no_part() -> None:
 @pytest.mark.parametrize("turn", [12.0, 30.0])
 @pytest.mark.parametrize("height", [0.4, -0.4])
 def test_over_the_rim_of_a_curved_surface_twice_the_angle_of_its_facets_is_forgiven(turn: float, height: float) -> None:
-    """Two facets that turn by an angle: the normal of the first turns by half of it to their common edge, so that
-    over the rim a slave may be beyond by 2 |n − n₀| = 4 sin(angle/4) of its height."""
+    """Two facets that turn by an angle: the normal of the first turns by half of it to their common edge and as much the
+    other way to the rim, over which a slave may be beyond by 2 |n − n₀| = 4 sin(angle/4) of its height."""
     c, s = math.cos(math.radians(turn)), math.sin(math.radians(turn))
     points = np.array([[-1, 0, 0], [0, 0, 0], [c, 0, -s], [-1, 1, 0], [0, 1, 0], [c, 1, -s]])
     roof = FacetSurface.from_facets(points, {"quad": np.array([[0, 1, 4, 3], [1, 2, 5, 4]])}, where="roof")
     allowed = 4 * math.sin(math.radians(turn) / 4) * abs(height)
+    half = math.radians(turn) / 2
+    normal, out = np.array([-math.sin(half), 0, math.cos(half)]), np.array([-math.cos(half), 0, -math.sin(half)])
     for part, inside in ((0.0, True), (0.97, True), (1.03, False)):
-        found = roof.locate(np.array([[-1 - part * allowed, 0.5, height]]))
+        found = roof.locate(np.array([[-1, 0.5, 0]]) + height * normal + part * allowed * out)
         assert found.inside[0] == inside, part
         assert found.point[0] == pytest.approx([-1, 0.5, 0], abs=1e-9)
         assert found.gap[0] == pytest.approx(height)

@@ -25,11 +25,12 @@ from scipy.spatial import cKDTree
 from ..errors import CaseError
 from ..mesh.facets import reference_nodes, shape_functions
 from ..mesh.model import Blocks
-from ..typing import Array, BoolArray, IntArray
+from ..typing import Array, BoolArray, IntArray, Sparse
 from .creases import creases
 from .facet_edges import Edges, corners_of, edges_of
 from .facet_search import EDGE_TOLERANCE, MONOMIALS, edge_coordinates, locate_all, nearest_edges, shape_of
 from .master import CORNER_DEG, Location
+from .rim_normals import rim_normals
 
 CANDIDATES = 4
 NODE = 1e-9  # weights below are none: a point within rounding of a node is that node, as in `facet_search`
@@ -58,7 +59,7 @@ class FacetSurface:
     coefficients of its coordinates on a part, in `MONOMIALS` of those of the part; curved (patterns,): whether facets
     are quadratic; element_groups (f, 9): the smoothed normals at their nodes. blocks: the mesh's own facets by kind in
     the surface's numbering. doubtful (q, 4): middle [m] and angle [rad] of edges that may be as well what they are not
-    taken as (`creases`).
+    taken as (`creases`). rim (groups, f): what normals of facets add to smoothed ones where the surface ends.
     """
 
     nodes: IntArray
@@ -77,6 +78,7 @@ class FacetSurface:
     element_groups: IntArray
     blocks: Blocks
     doubtful: Array
+    rim: Sparse
 
     @classmethod
     def from_facets(cls, points: Array, facets: Blocks, *, where: str, corner_deg: float = CORNER_DEG) -> FacetSurface:
@@ -113,10 +115,15 @@ class FacetSurface:
         curved = np.array([len(_splits(kind)) > 1 for kind in kinds])
         polynomials = np.stack([_polynomial_of(kind, split) for kind, split in zip(kinds, parts, strict=True)])
         at_nodes = _element_groups(groups, kinds, parts, pattern)
-        return cls(
+        nothing = sp.csr_array((int(groups.max()) + 1, len(local)))
+        averaged = cls(
             nodes, positions, local, neighbours, sharp, groups, elements, pattern, tangents, kinds, parts, polynomials,
-            curved, at_nodes, own, np.column_stack([edges.middle, edges.turn])[found.doubtful],
+            curved, at_nodes, own, np.column_stack([edges.middle, edges.turn])[found.doubtful], nothing,
         )  # fmt: skip
+        flat, smoothed = ~curved[pattern], averaged._normals(positions)
+        return replace(
+            averaged, rim=rim_normals(positions, local, neighbours, sharp, groups, flat, normals, smoothed)
+        )
 
     @property
     def node_count(self) -> int:
@@ -168,12 +175,12 @@ class FacetSurface:
         square = np.prod(np.sum(both * both, axis=3), axis=0)
         weighted /= np.where(valid & (square > 0), square, 1.0)[..., None]
         count = int(self.groups.max()) + 1
-        total = np.stack(
-            [np.bincount(self.groups[valid], weights=weighted[..., i][valid], minlength=count) for i in range(3)],
-            axis=1,
-        )
-        length = np.linalg.norm(total, axis=1, keepdims=True)
-        return np.ascontiguousarray(np.divide(total, length, out=np.zeros_like(total), where=length > 0))
+        total = [np.bincount(self.groups[valid], weights=weighted[..., i][valid], minlength=count) for i in range(3)]
+        smoothed = _unit(np.asarray(total, dtype=float).T)
+        if self.rim.nnz:
+            further = self.rim @ _facet_normals(current, self.facets)
+            smoothed = _unit(smoothed + further - np.sum(further * smoothed, axis=1, keepdims=True) * smoothed)
+        return np.ascontiguousarray(smoothed)
 
     def locate(self, slaves: Array, displacement: Array | None = None, *, guess: IntArray | None = None) -> Location:
         """Points of the displaced surface under slave positions (m, 3) [m], along its smoothed normals.
@@ -485,6 +492,12 @@ def _polynomial_of(kind: str, split: tuple[int, ...]) -> Array:
     found[:, : len(at)] = np.linalg.lstsq(powers, values, rcond=None)[0]
     # Those of shape functions on halves are multiples of 1/8, and rounding is none of them.
     return np.round(8.0 * found) / 8.0
+
+
+def _unit(vectors: Array) -> Array:
+    """Vectors (·, 3) of length one; those without length as they are."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
 
 def _following(facets: IntArray) -> IntArray:
