@@ -181,6 +181,24 @@ def test_moves_of_the_mesh_and_groups(export: Export):
     assert_same_modes(st.loads(MESHED), export.case().with_({"bodies.block.group": "body"}))
 
 
+def test_axes_of_nodes_that_the_mesh_turns_are_refused(export: Export):
+    """Abaqus writes matrices along the axes of *TRANSFORM: taken as x and y they would be another body's."""
+    deck = export.folder / "block.inp"
+    plain = deck.read_text(encoding="utf-8")
+    one, two = (int(n) for n in export.numbers[:2])
+    turn = f"*NSET, NSET=bolts\n{one}, {two}\n*TRANSFORM, NSET=Bolts, TYPE=C\n0., 0., 0., 0., 0., 1.\n"
+    deck.write_text(plain + turn, encoding="utf-8")
+    with pytest.raises(st.CaseError, match=f"bodies.block.mesh: .*block.inp.* gives node {min(one, two)} and 1 more axes") as told:
+        st.build_system(export.case())
+    assert "they must be in global axes: write matrices and mesh without *TRANSFORM" in str(told.value)
+    # Of nodes that the matrices do not name, and of a meshed body, axes say nothing.
+    other = "*NODE, NSET=far\n990, 5., 5.\n*TRANSFORM, NSET=far\n0., 1., 0., -1., 0., 0.\n"
+    deck.write_text(plain + other, encoding="utf-8")
+    assert_same_modes(st.loads(MESHED), export.case())
+    deck.write_text(plain + turn, encoding="utf-8")
+    assert_same_modes(st.loads(MESHED), st.loads(MESHED).with_({"bodies.block.mesh": None, "bodies.block.file": str(deck)}))
+
+
 def test_freedoms_of_no_node_come_last(export: Export):
     """A rotation and an internal freedom that hang on two displacements by springs."""
     n = len(export.freedoms)

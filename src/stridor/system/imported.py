@@ -123,6 +123,8 @@ def _with_indices(case: Case, name: str, body: MatrixBody, mu: float | None) -> 
     terms = load_terms(case, name, body, mu)
     mesh = None if body.mesh is None else _mesh(where, body)
     numbers = _node_numbers(where, body, terms.labels, mesh)
+    if mesh is not None and terms.labels is not None:
+        _check_axes(where, body, mesh, terms.labels)
     index, extra = _indices(where, body, terms.labels, numbers, terms.mass.shape[0], mesh)
     size = body.dimension * len(numbers) + len(extra)
     matrices = [_moved(getattr(terms, role), index, size) for role in ROLES]
@@ -258,6 +260,27 @@ def _mesh(where: str, body: MatrixBody) -> Mesh:
     if body.translation is not None:
         mesh = replace(mesh, points=mesh.points + np.array(body.translation))
     return mesh
+
+
+def _check_axes(where: str, body: MatrixBody, mesh: Mesh, labels: Labels) -> None:
+    """Raises CaseError where the mesh's file turns the axes of nodes along which the matrices have displacements.
+
+    *TRANSFORM makes u' = R u the freedoms of a node, so that Abaqus writes R K Rᵀ. Contacts, supports, springs and
+    loads along x, y, z would act on u' as if it were u.
+    """
+    assert mesh.numbers is not None, "read from an Abaqus file"
+    if mesh.turned is None:
+        return
+    moving = labels.node[(labels.direction >= 1) & (labels.direction <= body.dimension)]
+    turned = np.intersect1d(mesh.numbers[mesh.turned], moving)
+    if len(turned):
+        which = f"node {turned[0]}" + (f" and {len(turned) - 1} more" if len(turned) > 1 else "")
+        accepted = (
+            f"*TRANSFORM gives {which} axes of their own, along which Abaqus writes the matrices; they must be in "
+            "global axes: write matrices and mesh without *TRANSFORM (if these matrices are in global axes, delete it "
+            "in the mesh's file only)"
+        )
+        raise CaseError(f"{where}.mesh", shown_path(Path(body.mesh or "")), accepted)
 
 
 def _node_numbers(where: str, body: MatrixBody, labels: Labels | None, mesh: Mesh | None) -> IntArray:
