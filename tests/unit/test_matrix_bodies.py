@@ -513,3 +513,46 @@ def test_masters_slaves_and_bonded_bodies_in_space(tmp_path: Path, names: tuple[
     assert st.build_system(imported).symmetric_definite
     assert_same_modes(meshed, imported, rel=1e-9)
     assert st.steady_sliding(imported).normal_force.sum() == pytest.approx(48.4, rel=1e-9)
+
+
+def one_freedom(folder: Path, terms: str) -> st.Case:
+    """M = 1, K = 1e6 and a structural damping of a tenth of it, of Nastran."""
+    values = {"MAAX": 1.0, "KAAX": 1e6, "K4AAX": 1e5, "KDGG": -1e4, "KX": 1e6}
+    cards = "".join(f"DMIG,{n},0,6,2,0\nDMIG,{n},1,1,,1,1,{v:E}\n" for n, v in values.items())
+    (folder / "a.pch").write_text(cards, encoding="utf-8")
+    return st.loads(f"[matrices]\nterms = [{terms}]\n[modal]\nmax_frequency_hz = 1e3", folder=folder)
+
+
+def term(name: str, more: str = "") -> str:
+    return f'{{ file = "a.pch", name = "{name}"{more} }}, '
+
+
+def test_structural_damping_of_nastran_is_no_stiffness(tmp_path: Path):
+    """K4 = Σ GE·K: taken as stiffness the frequency is 166.92 Hz, and 159.15 Hz is right."""
+    usual = term("MAAX") + term("KAAX")
+    both = one_freedom(tmp_path, usual + term("K4AAX"))
+    with pytest.raises(st.CaseError, match=r"terms.2.role: missing – a.pch, K4AAX: by its name .* structural damping"):
+        st.build_system(both)
+    with pytest.raises(st.CaseError, match=r"terms.2.role: missing – a.pch, KDGG: by its name .* differential stiffness"):
+        st.build_system(one_freedom(tmp_path, usual + term("KDGG")))
+    viscous = one_freedom(tmp_path, usual + term("K4AAX", ', role = "damping", factor = "1/1e3"'))
+    root = st.modes(viscous).eigenvalues[0][0]
+    assert root == pytest.approx(-50.0 + 1j * np.sqrt(1e6 - 50.0**2), rel=1e-9)
+    assert st.describe(viscous).warnings == st.describe(one_freedom(tmp_path, usual)).warnings
+
+
+def test_roles_that_contradict_the_names_are_warned_of(tmp_path: Path):
+    def said(terms: str) -> list[str]:
+        warnings = st.describe(one_freedom(tmp_path, terms)).warnings
+        return [w for w in warnings if "roles exchanged" in w]
+
+    stiff, mass = ', role = "stiffness"', ', role = "mass"'
+    assert said(term("MAAX", stiff) + term("KAAX", mass)) == [
+        "bodies.matrices: a.pch: The role given is stiffness, but by its name it is a mass; are roles exchanged?",
+        "bodies.matrices: a.pch: The role given is mass, but by its name it is a stiffness; are roles exchanged?",
+    ]
+    usual = term("MAAX", mass) + term("KAAX", stiff)
+    assert said(usual) == []
+    # Softening by rotation, damping in proportion, and a first letter that need not mean anything.
+    assert said(usual + term("MAAX", stiff + ", factor = -4.0") + term("KAAX", ', role = "damping"')) == []
+    assert said(term("KX", mass) + term("KAAX")) == []

@@ -21,6 +21,7 @@ from ..matrices.labels import read_labels
 from ..matrices.model import Labels, Role, StoredMatrix
 from ..matrices.read import common_labels, read_matrix
 from ..matrices.report import held_freedoms
+from ..matrices.source import Doubt
 from ..mesh.abaqus import read_abaqus
 from ..mesh.model import Mesh
 from ..mesh.paths import check_file, shown_path
@@ -152,7 +153,7 @@ def load_terms(case: Case, name: str, body: MatrixBody, mu: float | None = None)
     roles: list[Role] = [_role(term, found, f"{where}.terms.{k}") for k, (term, found) in pairs]
     if "mass" not in roles:
         raise CaseError(f"{where}.terms", None, 'none has the role "mass"; without a mass nothing vibrates')
-    stored = [replace(found, role=role) for found, role in zip(read, roles, strict=True)]
+    stored = [_in_role(term, found, role) for term, found, role in zip(body.terms, read, roles, strict=True)]
     if body.labels is not None:
         stored = _with_labels(stored, body.labels, f"{where}.labels")
     matrices, labels = common_labels(stored, where=f"{where}.terms")
@@ -204,8 +205,25 @@ def _role(term: MatrixTerm, found: StoredMatrix, where: str) -> Role:
         return term.role
     if found.role is None:
         accepted = f'missing – {found.source} does not say what it holds; give "mass", "damping" or "stiffness"'
+        if found.unsaid:
+            accepted = f"missing – {found.source}, {found.name}: {found.unsaid}"
         raise CaseError(f"{where}.role", None, accepted)
     return found.role
+
+
+def _in_role(term: MatrixTerm, found: StoredMatrix, role: Role) -> StoredMatrix:
+    """What a file holds as a matrix of a role, with a doubt where its name tells of another.
+
+    Damping may be made of M and K, and a factor may make one of the other (−Ω² M is a stiffness): of these none.
+    """
+    if found.role in (None, role) or not found.certain or role == "damping" or term.factor != 1.0:
+        return replace(found, role=role)
+    doubt = Doubt(f"The role given is {role}, but by its name it is {_named_kind(found.role)}; are roles exchanged?")
+    return replace(found, role=role, notes=(*found.notes, doubt))
+
+
+def _named_kind(role: Role | None) -> str:
+    return f"a {role}" if role != "damping" else "damping"
 
 
 def _factor(case: Case, term: MatrixTerm, mu: float | None, where: str) -> float:
