@@ -16,6 +16,7 @@ import program
 import stridor as st
 from rubbing_block import rubbing_block
 from stridor.mesh.model import Mesh
+from stridor.study.matrix_reports import matrix_reports
 from stridor.system.bodies import BuiltBody, build_bodies
 
 MODAL = "max_frequency_hz = 40e3\nmodes = 8"
@@ -556,3 +557,31 @@ def test_roles_that_contradict_the_names_are_warned_of(tmp_path: Path):
     # Softening by rotation, damping in proportion, and a first letter that need not mean anything.
     assert said(usual + term("MAAX", stiff + ", factor = -4.0") + term("KAAX", ', role = "damping"')) == []
     assert said(term("KX", mass) + term("KAAX")) == []
+
+
+@pytest.mark.parametrize(
+    ("master", "side"),
+    [
+        ('type = "obstacle"\nshape = "flat"\npoint = [0.0, -1.0]\nnormal = [0.0, 1.0]', ""),
+        (
+            'type = "beam"\nmaterial = "steel"\nstart = [-1.0, 0.02]\nend = [1.0, 0.02]\nwidth = 0.1\nthickness = 0.1\n'
+            "elements = 4",
+            'side = "right"\n',
+        ),
+    ],
+)
+def test_matrices_are_reported_beside_a_master_as_a_whole(export: Export, master: str, side: str):
+    """An obstacle and a beam have no points by which a contact would name them."""
+    text = f"""
+    [bodies.under]
+    {master}
+    [contacts.more]
+    slave = "block.crown"
+    master = "under"
+    {side}stiffness = 1e9
+    friction = {{ law = "coulomb", coefficient = 0.2 }}
+    """
+    case = st.loads(export.text.replace("MORE", "") + text, folder=export.folder)
+    (found,) = matrix_reports(case).values()
+    assert found.contacts == ("face", "more")
+    assert "K is symmetric: friction is that of contacts.face, contacts.more, which the case makes" in found.lines()

@@ -296,6 +296,8 @@ def _pairing_problems(
 ) -> Iterator[Problem]:
     body = parts.bodies[slave.body]
     position = body.coordinates(slave.distance) if isinstance(body, BeamBody) else slave.coordinates
+    if contact.side is None and not isinstance(body, BeamBody):
+        yield Problem(f"{where}.side", None, f'missing – give "left" or "right" of {contact.master}')
     if position is None or len(position) != 2:  # None: a node whose place shows when the mesh is read
         return
     along, _ = signed_distance(master, *position)
@@ -311,8 +313,6 @@ def _pairing_problems(
             f'missing – {slave.body} lies on the line of {contact.master}; give "left" or "right" of it'
         )
         yield Problem(f"{where}.side", None, accepted)
-    if contact.side is None and not isinstance(body, BeamBody):
-        yield Problem(f"{where}.side", None, f'missing – give "left" or "right" of {contact.master}')
 
 
 def _tie_problems(parts: SoundTables) -> Iterator[Problem]:
