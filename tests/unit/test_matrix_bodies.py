@@ -585,3 +585,45 @@ def test_matrices_are_reported_beside_a_master_as_a_whole(export: Export, master
     (found,) = matrix_reports(case).values()
     assert found.contacts == ("face", "more")
     assert "K is symmetric: friction is that of contacts.face, contacts.more, which the case makes" in found.lines()
+
+
+def test_supports_hold_rotations_of_nodes(tmp_path: Path):
+    """A cantilever of one element, K = EI/l³ [12 −6l; −6l 4l²] with E I = l = 1: with its end held against rotation
+    12 N/m, free 3 N/m by condensation."""
+    sio.mmwrite(tmp_path / "K.mtx", sp.coo_array(np.array([[12.0, -6.0], [-6.0, 4.0]])))
+    sio.mmwrite(tmp_path / "M.mtx", sp.coo_array(np.diag([1.0, 1e-9])))
+    (tmp_path / "dof.txt").write_text("7 y\n7 rotz\n", encoding="utf-8")
+    text = """
+    [matrices]
+    dimension = 2
+    labels = "dof.txt"
+    terms = [{ file = "M.mtx", role = "mass" }, { file = "K.mtx", role = "stiffness" }]
+    points = { tip = 7 }
+    [modal]
+    max_frequency_hz = 10.0
+    """
+    held = '[supports.s]\nat = "matrices.tip"\nfixed = ["rotation"]\n'
+    free, guided = (st.loads(text + more, folder=tmp_path) for more in ("", held))
+    assert st.build_system(guided).dof_names == ("matrices node 7 y",)
+    assert st.modes(free).frequency_hz[0, 0] == pytest.approx(np.sqrt(3.0) / (2 * np.pi), rel=1e-8)
+    assert st.modes(guided).frequency_hz[0, 0] == pytest.approx(np.sqrt(12.0) / (2 * np.pi), rel=1e-12)
+    with pytest.raises(st.CaseError, match=r"supports.s.velocity.rotation: 1.0 – rotations of imported matrices can be held"):
+        st.loads(text + held + "velocity = { rotation = 1.0 }\n", folder=tmp_path)
+    (tmp_path / "dof.txt").write_text("7 y\n-1 0\n", encoding="utf-8")
+    with pytest.raises(st.CaseError, match=r"supports.s.fixed: 'rotation' – the matrices of matrices name no rotation there"):
+        st.build_system(st.loads(text + held, folder=tmp_path))
+
+
+def test_supports_hold_rotations_of_a_boundary(export: Export):
+    """Of nodes of a boundary only those that have rotations are held against them."""
+    top = export.body.mesh.boundary_nodes("top")
+    for letter in ("M", "C", "K"):
+        old = sp.coo_array(sio.mmread(export.folder / f"{letter}.mtx"))
+        extra = {"M": [0.01, 0.02, 0.03], "C": [0.0] * 3, "K": [1e4, 2e4, 3e4]}[letter]
+        sio.mmwrite(export.folder / f"{letter}.mtx", sp.coo_array(sp.block_diag([old, sp.diags_array(extra)])), precision=17)
+    other = np.setdiff1d(np.arange(len(export.numbers)), top)[0]
+    with (export.folder / "dof.txt").open("a", encoding="utf-8") as labels:
+        labels.write("".join(f"\n{export.numbers[node]} 6" for node in (top[1], other, top[0])))
+    held = export.case().with_({"supports.turn": {"at": "block.top", "fixed": ["rotation"]}})
+    names = [name for name in st.build_system(held).dof_names if "rotation" in name]
+    assert names == [f"block node {export.numbers[other]} rotation z"]

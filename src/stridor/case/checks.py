@@ -154,6 +154,12 @@ def _support_problems(parts: SoundTables) -> Iterator[Problem]:
             continue
         body = parts.bodies[point.body]
         known = ("x", "y", "rotation") if isinstance(body, BeamBody) else _AXES[body.dimension]
+        if isinstance(body, MatrixBody) and "rotation" in support.fixed:
+            for key, moved in (("velocity", support.velocity), ("displacement", support.displacement)):
+                if "rotation" in moved:
+                    accepted = "rotations of imported matrices can be held, not moved"
+                    yield Problem(f"{where}.{key}.rotation", moved["rotation"], accepted)
+            known = (*known, "rotation")  # whether they have any shows when they are read
         for direction in dict.fromkeys(support.fixed):
             if direction not in known:
                 accepted = f"{point.body} moves along {', '.join(known)} only"

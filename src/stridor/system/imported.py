@@ -66,7 +66,8 @@ class Imported:
     """Matrices (N, N) of a body: dimension · nodes displacements, then the extra freedoms.
 
     points (k, d) [m], NaN where no mesh gives them; numbers (k,) of the nodes, sorted or as in the mesh; lacking: local
-    freedoms that the matrices do not have; extra: what each of the freedoms beyond the displacements is called.
+    freedoms that the matrices do not have; extra: what each of the freedoms beyond the displacements is called;
+    rotations (r, 2): those of them that are a rotation of a node, as node, from 0, and local freedom.
     """
 
     mass: Sparse
@@ -77,6 +78,7 @@ class Imported:
     lacking: IntArray
     extra: tuple[str, ...]
     mesh: Mesh | None
+    rotations: IntArray
 
 
 def load_matrices(case: Case, name: str, body: MatrixBody, mu: float | None = None) -> Imported:
@@ -140,7 +142,9 @@ def _with_indices(case: Case, name: str, body: MatrixBody, mu: float | None) -> 
         raise CaseError(f"{where}.terms", None, f"{zero}; without a mass nothing vibrates")
     points = np.full((len(numbers), body.dimension), np.nan) if mesh is None else mesh.points
     mass, damping, stiffness = (cleaned(m) for m in matrices)
-    found = Imported(mass, damping, stiffness, points, numbers, np.flatnonzero(~present), tuple(extra), mesh)
+    rotations = _rotations(terms.labels, numbers, index)
+    lacking = np.flatnonzero(~present)
+    found = Imported(mass, damping, stiffness, points, numbers, lacking, tuple(extra), mesh, rotations)
     _check_points(where, body, found, terms.labels, present)
     return found, terms, index
 
@@ -347,6 +351,16 @@ def _indices(
     index[~moves] = d * len(numbers) + np.arange(np.count_nonzero(~moves))
     rest = zip(labels.node[~moves].tolist(), labels.direction[~moves].tolist(), strict=True)
     return index, [_extra_name(name, node, direction) for node, direction in rest]
+
+
+def _rotations(labels: Labels | None, numbers: IntArray, index: IntArray) -> IntArray:
+    """Rotations (r, 2) of the nodes of these numbers, as node and local freedom; index (n,): that of each label."""
+    if labels is None or not len(numbers):
+        return np.zeros((0, 2), dtype=np.int64)
+    order = np.argsort(numbers, kind="stable")
+    at = order[np.minimum(np.searchsorted(numbers[order], labels.node), len(numbers) - 1)]
+    mine = np.isin(labels.direction, _ROTATIONS) & (numbers[at] == labels.node)
+    return np.column_stack([at[mine], index[mine]])
 
 
 def _extra_name(name: str, node: int, direction: int) -> str:
