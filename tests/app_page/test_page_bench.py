@@ -16,6 +16,7 @@ from matrix_cases import matrix_case
 from stridor.app.page.bench import Bench
 from stridor.app.page.drawing import drawing
 from stridor.app.page.mesh_marks import held_nodes, pushes, slides
+from stridor.app.page.mode_data import shape_of
 from stridor.app.page.state import PageState, Source, first_state
 from stridor.case import Case, template_text
 from stridor.study.workspace import Workspace
@@ -168,6 +169,25 @@ def test_the_drawing_of_a_model_in_space_shows_what_holds_loads_and_moves_it():
     assert svg.count('class="support"') == len(held)
     assert "slides with 4.5 to 6.75 m/s" in svg
     assert ">500000 Pa<" in svg
+
+
+def test_a_point_mass_beside_a_mesh_is_drawn():
+    """Before it no drawing was made of such a model, and no mode of it."""
+    mesh = {"shape": "rectangle", "corner": [0, 0], "size": [0.02, 0.01], "divisions": [4, 2]}
+    block = {"type": "solid", "model": "plane stress", "material": "s", "thickness": 0.01, "mesh": mesh, "points": {"tip": [0.02, 0.01]}}
+    data = {"title": "block", "materials": {"s": {"young_modulus": 2e11, "poisson_ratio": 0.3, "density": 7800.0}},
+            "bodies": {"b": block, "w": {"type": "mass", "mass": 0.1, "position": [0.02, 0.03]}},
+            "springs": {"s": {"between": ["w", "b.tip"], "stiffness": 1e6},
+                        "t": {"between": ["w", "ground"], "stiffness": 1e6, "direction": [1, 0]}},
+            "supports": {"wall": {"at": "b.left", "fixed": ["x", "y"]}}}  # fmt: skip
+    case = st.Case(**data)
+    system = build_system(case)
+    svg = drawing(case, system)
+    assert svg.count("<circle ") == 1
+    assert ">w</text>" in svg
+    shape, _ = shape_of(system, st.modes(case, vectors="right"), 0, known="")
+    assert "undrawn" not in shape
+    assert shape["geometry"]["names"] == ["b", "w"]
 
 
 def test_a_load_is_drawn_once_with_its_own_number():

@@ -105,6 +105,10 @@ MORE = [
     ('[parameters.mu]\nvalue = 0.1\n[bodies.o]\ntype = "obstacle"\nshape = "flat"\npoint = [0.0, 1.0]\nnormal = [0.0, -1.0]\n'
      '[contacts.c]\nslave = "brake.top"\nmaster = "o"\nstiffness = 1e9\nfriction = { law = "coulomb", coefficient = 0.2 }',
      "parameters.mu: the contacts have friction coefficients; set contacts.c.friction.coefficient, or give --mu"),
+    ('[materials.m]\nyoung_modulus = 2e11\ndensity = 7800.0\n'
+     '[bodies.rail]\ntype = "beam"\nmaterial = "m"\nstart = [0.0, -1.0]\nend = [2.0, -1.0]\nwidth = 0.1\nthickness = 0.1\nelements = 4\n'
+     '[contacts.c]\nslave = "brake.tip"\nmaster = "rail"\nstiffness = 1e9\nfriction = { law = "coulomb", coefficient = 0.2 }',
+     'contacts.c.side: missing – give "left" or "right" of rail'),
 ]  # fmt: skip
 
 

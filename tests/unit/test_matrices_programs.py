@@ -90,7 +90,19 @@ def test_abaqus_not_symmetric_stays_as_it_is(read):
     assert stored.matrix.nnz == 7
 
 
-@pytest.mark.parametrize(("job", "role"), [("a_STIF1", "stiffness"), ("a_mass2", "mass"), ("a_DMPV1", "damping"), ("a", None)])
+@pytest.mark.parametrize(
+    ("job", "role"),
+    [
+        ("a_STIF1", "stiffness"),
+        ("a_mass2", "mass"),
+        ("a_DMPV1", "damping"),
+        ("a", None),
+        ("pad_mass_STIF1", "stiffness"),
+        ("low_load_STIF1", "stiffness"),
+        ("DMPS_MASS1", "mass"),
+        ("stif_2_mass_DMPV12", "damping"),
+    ],
+)
 def test_abaqus_roles_are_in_the_names(read, job, role):
     assert read(f"{job}.mtx", SLIDING).role == role
 
@@ -185,6 +197,27 @@ def test_nastran_large_fields_of_both_forms(read):
     stored = read("a.pch", large("BAAX", 1, GENERAL, FREEDOMS))
     assert stored.matrix.toarray().tolist() == GENERAL.tolist()
     assert (stored.role, stored.form) == ("damping", "general")
+
+
+@pytest.mark.parametrize(
+    ("name", "role", "certain"),
+    [
+        ("KGG", "stiffness", True),
+        ("KDD", "stiffness", True),  # all of the stiffness, of the d-set
+        ("K2PP", "stiffness", True),
+        ("MAAX", "mass", True),
+        ("BRAKE", "damping", False),
+        ("K4AAX", None, False),
+        ("k4gg", None, False),
+        ("K42GG", None, False),
+        ("KDGG", None, False),
+        ("PAX", None, False),
+    ],
+)
+def test_nastran_roles_are_in_the_names(read, name, role, certain):
+    stored = read("a.pch", large(name, 6, SYMMETRIC, FREEDOMS, half=True))
+    assert (stored.role, stored.certain) == (role, certain)
+    assert bool(stored.unsaid) == (name.upper()[:2] in ("K4", "KD") and role is None)
 
 
 def test_nastran_small_and_free_fields_and_continuations(read):

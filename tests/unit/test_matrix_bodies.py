@@ -16,6 +16,7 @@ import program
 import stridor as st
 from rubbing_block import rubbing_block
 from stridor.mesh.model import Mesh
+from stridor.study.matrix_reports import matrix_reports
 from stridor.system.bodies import BuiltBody, build_bodies
 
 MODAL = "max_frequency_hz = 40e3\nmodes = 8"
@@ -179,6 +180,24 @@ def test_moves_of_the_mesh_and_groups(export: Export):
     meshed = st.loads(MESHED).with_({"bodies.block.mesh.corner": [-0.005, 0.0]})
     assert_same_modes(meshed, export.case().with_({"bodies.block.translation": [0.005, 0.0]}))
     assert_same_modes(st.loads(MESHED), export.case().with_({"bodies.block.group": "body"}))
+
+
+def test_axes_of_nodes_that_the_mesh_turns_are_refused(export: Export):
+    """Abaqus writes matrices along the axes of *TRANSFORM: taken as x and y they would be another body's."""
+    deck = export.folder / "block.inp"
+    plain = deck.read_text(encoding="utf-8")
+    one, two = (int(n) for n in export.numbers[:2])
+    turn = f"*NSET, NSET=bolts\n{one}, {two}\n*TRANSFORM, NSET=Bolts, TYPE=C\n0., 0., 0., 0., 0., 1.\n"
+    deck.write_text(plain + turn, encoding="utf-8")
+    with pytest.raises(st.CaseError, match=f"bodies.block.mesh: .*block.inp.* gives node {min(one, two)} and 1 more axes") as told:
+        st.build_system(export.case())
+    assert "they must be in global axes: write matrices and mesh without *TRANSFORM" in str(told.value)
+    # Of nodes that the matrices do not name, and of a meshed body, axes say nothing.
+    other = "*NODE, NSET=far\n990, 5., 5.\n*TRANSFORM, NSET=far\n0., 1., 0., -1., 0., 0.\n"
+    deck.write_text(plain + other, encoding="utf-8")
+    assert_same_modes(st.loads(MESHED), export.case())
+    deck.write_text(plain + turn, encoding="utf-8")
+    assert_same_modes(st.loads(MESHED), st.loads(MESHED).with_({"bodies.block.mesh": None, "bodies.block.file": str(deck)}))
 
 
 def test_freedoms_of_no_node_come_last(export: Export):
@@ -495,3 +514,116 @@ def test_masters_slaves_and_bonded_bodies_in_space(tmp_path: Path, names: tuple[
     assert st.build_system(imported).symmetric_definite
     assert_same_modes(meshed, imported, rel=1e-9)
     assert st.steady_sliding(imported).normal_force.sum() == pytest.approx(48.4, rel=1e-9)
+
+
+def one_freedom(folder: Path, terms: str) -> st.Case:
+    """M = 1, K = 1e6 and a structural damping of a tenth of it, of Nastran."""
+    values = {"MAAX": 1.0, "KAAX": 1e6, "K4AAX": 1e5, "KDGG": -1e4, "KX": 1e6}
+    cards = "".join(f"DMIG,{n},0,6,2,0\nDMIG,{n},1,1,,1,1,{v:E}\n" for n, v in values.items())
+    (folder / "a.pch").write_text(cards, encoding="utf-8")
+    return st.loads(f"[matrices]\nterms = [{terms}]\n[modal]\nmax_frequency_hz = 1e3", folder=folder)
+
+
+def term(name: str, more: str = "") -> str:
+    return f'{{ file = "a.pch", name = "{name}"{more} }}, '
+
+
+def test_structural_damping_of_nastran_is_no_stiffness(tmp_path: Path):
+    """K4 = Σ GE·K: taken as stiffness the frequency is 166.92 Hz, and 159.15 Hz is right."""
+    usual = term("MAAX") + term("KAAX")
+    both = one_freedom(tmp_path, usual + term("K4AAX"))
+    with pytest.raises(st.CaseError, match=r"terms.2.role: missing – a.pch, K4AAX: by its name .* structural damping"):
+        st.build_system(both)
+    with pytest.raises(st.CaseError, match=r"terms.2.role: missing – a.pch, KDGG: by its name .* differential stiffness"):
+        st.build_system(one_freedom(tmp_path, usual + term("KDGG")))
+    viscous = one_freedom(tmp_path, usual + term("K4AAX", ', role = "damping", factor = "1/1e3"'))
+    root = st.modes(viscous).eigenvalues[0][0]
+    assert root == pytest.approx(-50.0 + 1j * np.sqrt(1e6 - 50.0**2), rel=1e-9)
+    assert st.describe(viscous).warnings == st.describe(one_freedom(tmp_path, usual)).warnings
+
+
+def test_roles_that_contradict_the_names_are_warned_of(tmp_path: Path):
+    def said(terms: str) -> list[str]:
+        warnings = st.describe(one_freedom(tmp_path, terms)).warnings
+        return [w for w in warnings if "roles exchanged" in w]
+
+    stiff, mass = ', role = "stiffness"', ', role = "mass"'
+    assert said(term("MAAX", stiff) + term("KAAX", mass)) == [
+        "bodies.matrices: a.pch: The role given is stiffness, but by its name it is a mass; are roles exchanged?",
+        "bodies.matrices: a.pch: The role given is mass, but by its name it is a stiffness; are roles exchanged?",
+    ]
+    usual = term("MAAX", mass) + term("KAAX", stiff)
+    assert said(usual) == []
+    # Softening by rotation, damping in proportion, and a first letter that need not mean anything.
+    assert said(usual + term("MAAX", stiff + ", factor = -4.0") + term("KAAX", ', role = "damping"')) == []
+    assert said(term("KX", mass) + term("KAAX")) == []
+
+
+@pytest.mark.parametrize(
+    ("master", "side"),
+    [
+        ('type = "obstacle"\nshape = "flat"\npoint = [0.0, -1.0]\nnormal = [0.0, 1.0]', ""),
+        (
+            'type = "beam"\nmaterial = "steel"\nstart = [-1.0, 0.02]\nend = [1.0, 0.02]\nwidth = 0.1\nthickness = 0.1\n'
+            "elements = 4",
+            'side = "right"\n',
+        ),
+    ],
+)
+def test_matrices_are_reported_beside_a_master_as_a_whole(export: Export, master: str, side: str):
+    """An obstacle and a beam have no points by which a contact would name them."""
+    text = f"""
+    [bodies.under]
+    {master}
+    [contacts.more]
+    slave = "block.crown"
+    master = "under"
+    {side}stiffness = 1e9
+    friction = {{ law = "coulomb", coefficient = 0.2 }}
+    """
+    case = st.loads(export.text.replace("MORE", "") + text, folder=export.folder)
+    (found,) = matrix_reports(case).values()
+    assert found.contacts == ("face", "more")
+    assert "K is symmetric: friction is that of contacts.face, contacts.more, which the case makes" in found.lines()
+
+
+def test_supports_hold_rotations_of_nodes(tmp_path: Path):
+    """A cantilever of one element, K = EI/l³ [12 −6l; −6l 4l²] with E I = l = 1: with its end held against rotation
+    12 N/m, free 3 N/m by condensation."""
+    sio.mmwrite(tmp_path / "K.mtx", sp.coo_array(np.array([[12.0, -6.0], [-6.0, 4.0]])))
+    sio.mmwrite(tmp_path / "M.mtx", sp.coo_array(np.diag([1.0, 1e-9])))
+    (tmp_path / "dof.txt").write_text("7 y\n7 rotz\n", encoding="utf-8")
+    text = """
+    [matrices]
+    dimension = 2
+    labels = "dof.txt"
+    terms = [{ file = "M.mtx", role = "mass" }, { file = "K.mtx", role = "stiffness" }]
+    points = { tip = 7 }
+    [modal]
+    max_frequency_hz = 10.0
+    """
+    held = '[supports.s]\nat = "matrices.tip"\nfixed = ["rotation"]\n'
+    free, guided = (st.loads(text + more, folder=tmp_path) for more in ("", held))
+    assert st.build_system(guided).dof_names == ("matrices node 7 y",)
+    assert st.modes(free).frequency_hz[0, 0] == pytest.approx(np.sqrt(3.0) / (2 * np.pi), rel=1e-8)
+    assert st.modes(guided).frequency_hz[0, 0] == pytest.approx(np.sqrt(12.0) / (2 * np.pi), rel=1e-12)
+    with pytest.raises(st.CaseError, match=r"supports.s.velocity.rotation: 1.0 – rotations of imported matrices can be held"):
+        st.loads(text + held + "velocity = { rotation = 1.0 }\n", folder=tmp_path)
+    (tmp_path / "dof.txt").write_text("7 y\n-1 0\n", encoding="utf-8")
+    with pytest.raises(st.CaseError, match=r"supports.s.fixed: 'rotation' – the matrices of matrices name no rotation there"):
+        st.build_system(st.loads(text + held, folder=tmp_path))
+
+
+def test_supports_hold_rotations_of_a_boundary(export: Export):
+    """Of nodes of a boundary only those that have rotations are held against them."""
+    top = export.body.mesh.boundary_nodes("top")
+    for letter in ("M", "C", "K"):
+        old = sp.coo_array(sio.mmread(export.folder / f"{letter}.mtx"))
+        extra = {"M": [0.01, 0.02, 0.03], "C": [0.0] * 3, "K": [1e4, 2e4, 3e4]}[letter]
+        sio.mmwrite(export.folder / f"{letter}.mtx", sp.coo_array(sp.block_diag([old, sp.diags_array(extra)])), precision=17)
+    other = np.setdiff1d(np.arange(len(export.numbers)), top)[0]
+    with (export.folder / "dof.txt").open("a", encoding="utf-8") as labels:
+        labels.write("".join(f"\n{export.numbers[node]} 6" for node in (top[1], other, top[0])))
+    held = export.case().with_({"supports.turn": {"at": "block.top", "fixed": ["rotation"]}})
+    names = [name for name in st.build_system(held).dof_names if "rotation" in name]
+    assert names == [f"block node {export.numbers[other]} rotation z"]

@@ -466,3 +466,19 @@ def test_whatever_is_done_to_a_file_only_case_errors_come_of_it(read, source, ed
     else:
         assert mesh.cell_count > 0
         assert np.isfinite(mesh.points).all()
+
+
+def test_nodes_with_axes_of_their_own_are_told(tmp_path):
+    """*TRANSFORM of a part goes with its instances; nodes outside the body are left out."""
+    part = BASE.replace("*NODE", "*PART, NAME=p\n*NODE") + "*NSET,NSET=t,INTERNAL\n2\n*TRANSFORM,NSET=t\n0,1,0,-1,0,0\n*END PART\n"
+    instances = "".join(f"*INSTANCE,NAME={n},PART=p\n{k},0,0\n*END INSTANCE\n" for k, n in enumerate("ab"))
+    more = "*NSET,NSET=s,INSTANCE=b\n3\n*TRANSFORM,NSET=s\n0,1,0,-1,0,0\n*TRANSFORM,NSET=a.t\n0,1,0,-1,0,0\n"
+    file = tmp_path / "m.inp"
+    file.write_text(part + instances + more, encoding="utf-8")
+    mesh = read_abaqus(file).mesh
+    assert mesh.turned is not None
+    assert mesh.turned.tolist() == [1, 4, 5]
+    assert not mesh.node_sets.keys() & {"t", "a.t", "b.t"}
+    alone = read_abaqus(file, group="b").mesh
+    assert alone.turned is not None
+    assert alone.turned.tolist() == [1, 2]

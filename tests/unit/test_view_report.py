@@ -24,6 +24,7 @@ from test_view_plots import (
 )
 
 from benches import paper_case
+from stridor.errors import CaseError
 from stridor.stages import heard
 from stridor.temporal.signals import spectrogram
 from stridor.view import FrictionCurve, NamedFrequencies, NamedShape, ReportInputs, plots, write_report
@@ -343,3 +344,18 @@ def test_what_is_drawn_is_told(writing):
     assert told[-1] == ""
     drawn = {path.stem for path in (report.parent / "figures").glob("*.svg")}
     assert set(told[1:-1]) == {f"figure {name}, as SVG and PNG" for name in drawn}
+
+
+def test_what_cannot_be_drawn_is_named_and_the_rest_is_there(tmp_path, monkeypatch):
+    def broken(*_args, **_options):
+        raise CaseError("cells", "wedge", "not a kind that can be drawn")
+
+    monkeypatch.setattr(plots, "root_locus", broken)
+    with nothing_drawn():
+        page = Page(write_report(full_inputs(), tmp_path).read_text(encoding="utf-8"))
+    assert "Not drawn: Root locus, CaseError: cells: 'wedge' – not a kind that can be drawn" in page.text
+    names = {path.stem for path in (tmp_path / "figures").glob("*.svg")}
+    assert {"model", "frequencies"} <= names
+    assert "root-locus" not in names
+    assert "figure-frequencies" in page.ids
+    assert "figure-root-locus" not in page.ids

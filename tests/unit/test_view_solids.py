@@ -39,6 +39,7 @@ from stridor.view.field_plots import MAP_COLOURS, contact_map, contact_snapshot,
 from stridor.view.interface_columns import arc_length, columns_along
 from stridor.view.mode_motion import QUANTA
 from stridor.view.mode_page import COLOURS
+from stridor.view.shape_plots import model_plot
 from stridor.view.skin import normals, skin_of, surface_facets
 from stridor.view.style import lay_out
 
@@ -240,6 +241,52 @@ def test_vectors_that_do_not_fit_are_refused():
         skin_of(System(*(sp.eye_array(2, format="csr"),) * 3))
 
 
+def beside_a_mass(dimension: int, *, line: bool = False) -> System:
+    """A point mass above a plate or a box, listed before it, and a beam or none."""
+    beam = np.column_stack([np.full(3, 0.05), np.linspace(0.05, 0.1, 3)])
+    body = plates(4, 2) if dimension == 2 else boxes((2, 2, 2), (0.02, 0.02, 0.02))
+    mass = np.array([[0.01, 0.05, 0.04][:dimension]]), {"vertex": np.zeros((1, 1), dtype=np.int64)}
+    return made([mass, body], dimension, lines=[beam] if line else [])
+
+
+@pytest.mark.parametrize(("dimension", "line"), [(2, False), (2, True), (3, False)])
+def test_point_masses_are_dots_that_move(dimension, line):
+    system = beside_a_mass(dimension, line=line)
+    vector = np.zeros(system.size, dtype=complex)
+    vector[:dimension] = (1e-6 + 1e-6j) * np.arange(1, dimension + 1)
+    skin = skin_of(system, vector)
+    assert skin.names == ("body2", "body1", *(["beam1"] if line else []))
+    assert skin.segment_body[skin.lone].tolist() == [1]
+    at = skin.segments[skin.lone[0], 0]
+    assert np.array_equal(skin.points[at], system.solids[0].points[0])
+    assert np.array_equal(skin.motion[at], vector[:dimension])
+    assert np.count_nonzero(skin.motion) == dimension
+    assert skin.closed == (dimension == 3)
+    figure = solid_plots.mode_shape(system, vector)
+    rest, moved = (d for d in figure.axes[0].collections if isinstance(d, PathCollection))
+    assert to_rgba(np.asarray(moved.get_facecolor())[0]) == pytest.approx(mpl.colormaps["viridis"](1.0))
+    assert np.linalg.norm(np.asarray(moved.get_offsets()) - np.asarray(rest.get_offsets())) > 0
+    drawn(figure)
+    legend = solid_plots.mesh(system).axes[0].get_legend()
+    assert [t.get_text() for t in legend.get_texts()] == list(skin.names)
+    data = page_of(animation_html(system, vector, frequency_hz=10.0))
+    assert data["meshed"] == 1
+    ends = unpacked(data, "segments", "<u2").reshape(-1, 2)
+    assert ends[ends[:, 0] == ends[:, 1]].tolist() == [[at, at]]
+    assert animation_gif(system, vector, frequency_hz=10.0, frames=2).startswith(b"GIF")
+
+
+def test_beams_and_a_mass_are_drawn_and_masses_alone_are_no_shape():
+    beam = np.column_stack([np.linspace(0.0, 0.1, 3), np.zeros(3)])
+    mass = np.array([[0.1, 0.05]]), {"vertex": np.zeros((1, 1), dtype=np.int64)}
+    system = made([mass], 2, lines=[beam])
+    drawn(solid_plots.mode_shape(system, np.ones(system.size)))
+    at = [line.get_xydata().tolist() for line in model_plot(system).axes[0].lines]
+    assert [[100.0, 50.0]] in at  # mm
+    with pytest.raises(CaseError, match="neither solids nor lines"):
+        skin_of(made([mass], 2))
+
+
 # -- pictures of solids ------------------------------------------------------------------------------------------------
 
 
@@ -429,8 +476,8 @@ const node = (id) => made[id] ??= { id, value: {amplitude: "1", speed: "0.6", co
   textContent: id === "data" ? DATA : "", clientWidth: 300, clientHeight: 200, addEventListener() {}, append() {},
   replaceChildren() {}, getContext: () => context };
 const context = { createImageData: (w, h) => ({ data: new Uint8ClampedArray(4 * w * h) }), beginPath() {}, moveTo() {},
-  lineTo() {}, stroke() { strokes++; }, putImageData(image) { shown = new Uint32Array(image.data.buffer); } };
-let strokes = 0, shown = null, waiting = null;
+  lineTo() {}, stroke() { strokes++; }, arc(x, y) { dots.push([x, y]); }, fill() {}, putImageData(image) { shown = new Uint32Array(image.data.buffer); } };
+let strokes = 0, dots = [], shown = null, waiting = null;
 globalThis.document = { getElementById: node, createElement: () => ({ style: {}, append() {} }) };
 globalThis.window = { devicePixelRatio: 1, addEventListener() {} };
 globalThis.matchMedia = () => ({ matches: true });
@@ -463,6 +510,25 @@ def test_script_of_the_page_draws(colours, tmp_path):
         assert found["strokes"] == 5  # the beam's pieces
         # Everything moves alike: one colour, and that of the mesh on it.
         assert len(painted) == 2
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="the page's script is run with node")
+def test_script_of_the_page_draws_point_masses(tmp_path):
+    """A line from a point to itself is none on a canvas."""
+    system = beside_a_mass(2, line=True)
+    html = animation_html(system, np.ones(system.size), frequency_hz=10.0)
+    script = html[html.index('"use strict"') : html.rindex("</script>")]
+    head = STUB.replace("COLOURS", json.dumps("size")).replace("DATA", json.dumps(json.dumps(page_of(html))))
+    file = tmp_path / "page.js"
+    tail = "\nwaiting(0);\nconsole.log(JSON.stringify({ strokes, dots }));"
+    file.write_text(head + "{" + script + "}" + tail, encoding="utf-8")
+    done = subprocess.run(["node", str(file)], capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["strokes"] == 2  # the beam's pieces
+    ((x, y),) = found["dots"]
+    assert 0 < x < 300
+    assert 0 < y < 200
 
 
 def test_gif_has_the_frames_of_one_cycle():

@@ -154,6 +154,12 @@ def _support_problems(parts: SoundTables) -> Iterator[Problem]:
             continue
         body = parts.bodies[point.body]
         known = ("x", "y", "rotation") if isinstance(body, BeamBody) else _AXES[body.dimension]
+        if isinstance(body, MatrixBody) and "rotation" in support.fixed:
+            for key, moved in (("velocity", support.velocity), ("displacement", support.displacement)):
+                if "rotation" in moved:
+                    accepted = "rotations of imported matrices can be held, not moved"
+                    yield Problem(f"{where}.{key}.rotation", moved["rotation"], accepted)
+            known = (*known, "rotation")  # whether they have any shows when they are read
         for direction in dict.fromkeys(support.fixed):
             if direction not in known:
                 accepted = f"{point.body} moves along {', '.join(known)} only"
@@ -296,6 +302,8 @@ def _pairing_problems(
 ) -> Iterator[Problem]:
     body = parts.bodies[slave.body]
     position = body.coordinates(slave.distance) if isinstance(body, BeamBody) else slave.coordinates
+    if contact.side is None and not isinstance(body, BeamBody):
+        yield Problem(f"{where}.side", None, f'missing – give "left" or "right" of {contact.master}')
     if position is None or len(position) != 2:  # None: a node whose place shows when the mesh is read
         return
     along, _ = signed_distance(master, *position)
@@ -311,8 +319,6 @@ def _pairing_problems(
             f'missing – {slave.body} lies on the line of {contact.master}; give "left" or "right" of it'
         )
         yield Problem(f"{where}.side", None, accepted)
-    if contact.side is None and not isinstance(body, BeamBody):
-        yield Problem(f"{where}.side", None, f'missing – give "left" or "right" of {contact.master}')
 
 
 def _tie_problems(parts: SoundTables) -> Iterator[Problem]:

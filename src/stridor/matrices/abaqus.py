@@ -29,7 +29,8 @@ HELD = 1e30
 _CHUNK = 1 << 23
 # A keyword's line goes on behind a comma at its end, a comment's does not.
 _KEYWORD_LINE = re.compile(rb"^[ \t]*\*(?:\*.*|(?:[^*\n][^\n]*,[ \t\r]*\n)*[^\n]*)$", re.MULTILINE)
-_KIND = re.compile(r"(?:^|_)(STIF|MASS|DMPV|DMPS|LOAD)\d*(?:_|$)")
+# JOB_STIF1; what follows is looked at only, for in JOB = pad_mass the kind before it shares its "_".
+_KIND = re.compile(r"(?:^|_)(STIF|MASS|DMPV|DMPS|LOAD)\d*(?=_|$)")
 _TO_BLANKS = bytes.maketrans(b",\rDd", b"  EE")
 _LARGEST_NODE = 2**31 - 1
 _LARGEST_FREEDOM = 999
@@ -96,7 +97,8 @@ def _type(section: _Section) -> str | None:
 
 
 def _role(source: MatrixFile) -> Role | None:
-    """What the name of the file says. Raises CaseError for what is no matrix of M, C or K."""
+    """What the name of the file says, its last word that names a kind, for the job's name stands before it. Raises
+    CaseError for what is no matrix of M, C or K."""
     found = _KIND.findall(source.path.name.upper().split(".")[0])
     kind = found[-1] if found else ""
     if kind == "DMPS":

@@ -29,6 +29,8 @@ class StoredMatrix:
     program: "Abaqus" or "CalculiX" where only that program writes such a file. declared: whether the file says in so
     many words that the matrix is not symmetric, as other formats do of whatever they hold. lone: how many entries are
     below and above the diagonal where none of them has a counterpart across it, as of a half; None where some have.
+    certain: whether the role is what the program itself calls the matrix, not only read from a first letter. unsaid:
+    why a matrix without a role has none, where its name says what it is, and which role to give.
     """
 
     matrix: Sparse
@@ -41,3 +43,5 @@ class StoredMatrix:
     program: Literal["Abaqus", "CalculiX"] | None = None
     declared: bool = False
     lone: tuple[int, int] | None = None
+    certain: bool = True
+    unsaid: str = ""

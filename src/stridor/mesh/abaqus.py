@@ -1,7 +1,7 @@
 """Abaqus and CalculiX input files: a body's mesh, and the materials and sections that the file gives it.
 
 What says nothing about the body (steps, loads, outputs, interactions) is passed over; what would change its nodes or
-elements and is not understood is refused.
+elements and is not understood is refused. Axes of *TRANSFORM move nothing, and are told by the mesh (`Mesh.turned`).
 """
 
 from __future__ import annotations

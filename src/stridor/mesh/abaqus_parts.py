@@ -85,6 +85,7 @@ class Scope:
     elsets: dict[str, NamedSet] = field(default_factory=dict)
     surfaces: dict[str, SurfaceCard] = field(default_factory=dict)
     sections: list[SectionCard] = field(default_factory=list)
+    transforms: list[Card] = field(default_factory=list)
 
 
 class PartsReader:
@@ -104,6 +105,7 @@ class PartsReader:
             "ELSET": self._set,
             "SURFACE": self._surface,
             "SOLID SECTION": self._section,
+            "TRANSFORM": self._transform,
             "PART": self._part,
             "END PART": self._end_part,
             "INSTANCE": self._begin_instance,
@@ -188,6 +190,10 @@ class PartsReader:
             # Of a solid section in space Abaqus's own files hold a lone comma, or 1: neither is a thickness of nothing.
             self._scope.sections.append(SectionCard(card.need("ELSET"), material, thickness or None, card.line))
 
+    def _transform(self, card: Card) -> None:
+        if card.options.get("NSET"):
+            self._scope.transforms.append(card)
+
     def _part(self, card: Card) -> None:
         if self._scope is not self.top:
             card.line.refuse("*PART must stand on its own, after *END PART and outside *ASSEMBLY")
@@ -230,6 +236,7 @@ class PartsReader:
                 elsets=base.elsets | own.elsets,
                 surfaces=base.surfaces | own.surfaces,
                 sections=base.sections + own.sections,
+                transforms=base.transforms + own.transforms,
             )
         )
         self._instance, self._scope = None, self.top

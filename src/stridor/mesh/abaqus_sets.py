@@ -86,7 +86,9 @@ class Collector:
                 if len(every) and name not in {r.upper() for r in regions}:
                     regions[self._bodies[b].name] = self._by_kind(every)
         numbers = np.array([n for nodes in self._node_index for n in nodes], dtype=np.int64)
-        return Contents(self._points, self._cells, regions, facets, node_sets, ACCEPTED_TYPES, numbers)
+        return Contents(
+            self._points, self._cells, regions, facets, node_sets, ACCEPTED_TYPES, numbers, self._turned()
+        )
 
     def shown_name(self, table: str, body: int, name: str) -> str:
         """What a set or surface of a body is called in the mesh."""
@@ -94,6 +96,12 @@ class Collector:
             return name
         taken = name.upper() in getattr(self._bodies[0], table)
         return f"{self._bodies[body].name}.{name}" if taken or len(self._instances) > 1 else name
+
+    def _turned(self) -> IntArray:
+        """Nodes, numbered through, whose freedoms *TRANSFORM puts along axes of their own."""
+        cards = [(b, card) for b, scope in enumerate(self._bodies) for card in scope.transforms]
+        parts = [self._listed("NSET", b, card.line, [card.options["NSET"]], 0) for b, card in cards]
+        return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *parts]))
 
     def _by_kind(self, elements: IntArray) -> dict[str, IntArray]:
         """Elements, numbered through, as rows of the cells of each kind."""

@@ -26,7 +26,7 @@ class Contents:
     """What a file holds. points (k, 2 or 3); cells by kind, also by kinds that cannot be computed with, but no facets;
     regions: name → cells as indices into cells[kind]; facets: name → facets by kind, in any orientation; node_sets:
     name → nodes. accepted: cells that can be computed with, in the words of the file's format. numbers (k,): what the
-    file calls its points.
+    file calls its points; turned (s,): points whose freedoms it puts along axes of their own.
     """
 
     points: Array
@@ -36,6 +36,7 @@ class Contents:
     node_sets: Mapping[str, IntArray] = field(default_factory=dict)
     accepted: str = ", ".join((*PLANE_KINDS, *SOLID_KINDS))
     numbers: IntArray | None = None
+    turned: IntArray | None = None
 
 
 def gather(contents: Contents, *, source: str, where: str, group: str | None = None, scale: float = 1.0) -> Mesh:
@@ -82,7 +83,8 @@ def gather(contents: Contents, *, source: str, where: str, group: str | None = N
             boundaries[name] = matched.outer
     regions = _regions(contents, chosen)
     numbers = None if contents.numbers is None else contents.numbers[used]
-    return Mesh(points, mine, boundaries, node_sets, regions, source, numbers)
+    turned = None if contents.turned is None else new[contents.turned[used[contents.turned]]]
+    return Mesh(points, mine, boundaries, node_sets, regions, source, numbers, turned)
 
 
 def _chosen(contents: Contents, where: str, group: str | None, source: str) -> dict[str, IntArray]:

@@ -29,7 +29,8 @@ class Mesh:
     the body lies on the left of a line from its first to its second node (outward is right), in space the corners
     turn counter-clockwise seen from outside. node_sets: name → nodes (s,), sorted. regions: name → cells by kind as
     indices into `cells[kind]`. source says where the mesh came from, for messages. numbers (k,): what the file calls
-    the points, None where it numbers none.
+    the points, None where it numbers none. turned (s,): points at which the file has axes other than x, y, z for the
+    freedoms, which says nothing of the mesh, but of matrices and conditions written along them; None: no such axes.
     """
 
     points: Array
@@ -39,6 +40,7 @@ class Mesh:
     regions: Mapping[str, Mapping[str, IntArray]] = field(default_factory=dict)
     source: str = ""
     numbers: IntArray | None = None
+    turned: IntArray | None = None
 
     @property
     def dimension(self) -> int:

@@ -89,7 +89,8 @@ def _held(case: Case, body: str) -> list[str]:
 def _report(case: Case, name: str, body: MatrixBody, mu: float | None) -> BodyReport:
     terms = load_terms(case, name, body, mu)
     pairs = zip(terms.shares, terms.values, strict=True)
-    sides = {key: {case.location(at).body for at in (c.slave, c.master)} for key, c in case.contacts.items()}
+    # A beam and an obstacle are masters as a whole, and no places.
+    sides = {key: {case.location(c.slave).body, c.master.partition(".")[0]} for key, c in case.contacts.items()}
     contacts = [key for key, bodies in sides.items() if name in bodies]
     matrices = report(
         terms.mass, terms.damping, terms.stiffness, labels=terms.labels, stored=terms.stored,

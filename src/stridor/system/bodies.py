@@ -33,7 +33,8 @@ class BuiltBody:
     """A body and its matrices (size, size) csr. stride freedoms per node, of which the first ``dimension`` are
     displacements, then freedoms of no node, called ``extra``; points (k, d) [m] are its nodes, NaN where nothing says
     where these are. beam or mesh is what it was built from. numbers (k,): what another program calls the nodes;
-    lacking: freedoms, counted within the body, that its matrices do not have."""
+    lacking: freedoms, counted within the body, that its matrices do not have; rotations (r, 2): node and freedom,
+    counted within the body, of those among ``extra`` that turn a node."""
 
     name: str
     offset: int
@@ -48,6 +49,7 @@ class BuiltBody:
     extra: tuple[str, ...] = ()
     numbers: IntArray | None = None
     lacking: IntArray | None = None
+    rotations: IntArray | None = None
 
     @property
     def size(self) -> int:
@@ -67,6 +69,14 @@ class BuiltBody:
     def displacements(self, nodes: IntArray) -> IntArray:
         """Freedoms (s, d) in the structure of the displacements of nodes (s,)."""
         return self.offset + self.stride * nodes[:, None] + np.arange(self.dimension)
+
+    def rotations_of(self, nodes: IntArray) -> IntArray:
+        """Freedoms in the structure of all rotations that nodes (s,) have, of a beam one for each."""
+        if self.beam is not None:
+            return self.offset + self.stride * nodes + self.stride - 1
+        if self.rotations is None:
+            return np.zeros(0, dtype=np.int64)
+        return self.offset + self.rotations[np.isin(self.rotations[:, 0], nodes), 1]
 
     @cached_property
     def freedom_names(self) -> tuple[str, ...]:
@@ -234,6 +244,7 @@ def _imported(case: Case, name: str, body: MatrixBody, offset: int, mu: float | 
         extra=found.extra,
         numbers=found.numbers,
         lacking=found.lacking,
+        rotations=found.rotations,
     )
 
 

@@ -21,6 +21,7 @@ from ..matrices.labels import read_labels
 from ..matrices.model import Labels, Role, StoredMatrix
 from ..matrices.read import common_labels, read_matrix
 from ..matrices.report import held_freedoms
+from ..matrices.source import Doubt
 from ..mesh.abaqus import read_abaqus
 from ..mesh.model import Mesh
 from ..mesh.paths import check_file, shown_path
@@ -65,7 +66,8 @@ class Imported:
     """Matrices (N, N) of a body: dimension · nodes displacements, then the extra freedoms.
 
     points (k, d) [m], NaN where no mesh gives them; numbers (k,) of the nodes, sorted or as in the mesh; lacking: local
-    freedoms that the matrices do not have; extra: what each of the freedoms beyond the displacements is called.
+    freedoms that the matrices do not have; extra: what each of the freedoms beyond the displacements is called;
+    rotations (r, 2): those of them that are a rotation of a node, as node, from 0, and local freedom.
     """
 
     mass: Sparse
@@ -76,6 +78,7 @@ class Imported:
     lacking: IntArray
     extra: tuple[str, ...]
     mesh: Mesh | None
+    rotations: IntArray
 
 
 def load_matrices(case: Case, name: str, body: MatrixBody, mu: float | None = None) -> Imported:
@@ -123,6 +126,8 @@ def _with_indices(case: Case, name: str, body: MatrixBody, mu: float | None) -> 
     terms = load_terms(case, name, body, mu)
     mesh = None if body.mesh is None else _mesh(where, body)
     numbers = _node_numbers(where, body, terms.labels, mesh)
+    if mesh is not None and terms.labels is not None:
+        _check_axes(where, body, mesh, terms.labels)
     index, extra = _indices(where, body, terms.labels, numbers, terms.mass.shape[0], mesh)
     size = body.dimension * len(numbers) + len(extra)
     matrices = [_moved(getattr(terms, role), index, size) for role in ROLES]
@@ -137,7 +142,9 @@ def _with_indices(case: Case, name: str, body: MatrixBody, mu: float | None) -> 
         raise CaseError(f"{where}.terms", None, f"{zero}; without a mass nothing vibrates")
     points = np.full((len(numbers), body.dimension), np.nan) if mesh is None else mesh.points
     mass, damping, stiffness = (cleaned(m) for m in matrices)
-    found = Imported(mass, damping, stiffness, points, numbers, np.flatnonzero(~present), tuple(extra), mesh)
+    rotations = _rotations(terms.labels, numbers, index)
+    lacking = np.flatnonzero(~present)
+    found = Imported(mass, damping, stiffness, points, numbers, lacking, tuple(extra), mesh, rotations)
     _check_points(where, body, found, terms.labels, present)
     return found, terms, index
 
@@ -150,7 +157,7 @@ def load_terms(case: Case, name: str, body: MatrixBody, mu: float | None = None)
     roles: list[Role] = [_role(term, found, f"{where}.terms.{k}") for k, (term, found) in pairs]
     if "mass" not in roles:
         raise CaseError(f"{where}.terms", None, 'none has the role "mass"; without a mass nothing vibrates')
-    stored = [replace(found, role=role) for found, role in zip(read, roles, strict=True)]
+    stored = [_in_role(term, found, role) for term, found, role in zip(body.terms, read, roles, strict=True)]
     if body.labels is not None:
         stored = _with_labels(stored, body.labels, f"{where}.labels")
     matrices, labels = common_labels(stored, where=f"{where}.terms")
@@ -202,8 +209,25 @@ def _role(term: MatrixTerm, found: StoredMatrix, where: str) -> Role:
         return term.role
     if found.role is None:
         accepted = f'missing – {found.source} does not say what it holds; give "mass", "damping" or "stiffness"'
+        if found.unsaid:
+            accepted = f"missing – {found.source}, {found.name}: {found.unsaid}"
         raise CaseError(f"{where}.role", None, accepted)
     return found.role
+
+
+def _in_role(term: MatrixTerm, found: StoredMatrix, role: Role) -> StoredMatrix:
+    """What a file holds as a matrix of a role, with a doubt where its name tells of another.
+
+    Damping may be made of M and K, and a factor may make one of the other (−Ω² M is a stiffness): of these none.
+    """
+    if found.role in (None, role) or not found.certain or role == "damping" or term.factor != 1.0:
+        return replace(found, role=role)
+    doubt = Doubt(f"The role given is {role}, but by its name it is {_named_kind(found.role)}; are roles exchanged?")
+    return replace(found, role=role, notes=(*found.notes, doubt))
+
+
+def _named_kind(role: Role | None) -> str:
+    return f"a {role}" if role != "damping" else "damping"
 
 
 def _factor(case: Case, term: MatrixTerm, mu: float | None, where: str) -> float:
@@ -260,6 +284,27 @@ def _mesh(where: str, body: MatrixBody) -> Mesh:
     return mesh
 
 
+def _check_axes(where: str, body: MatrixBody, mesh: Mesh, labels: Labels) -> None:
+    """Raises CaseError where the mesh's file turns the axes of nodes along which the matrices have displacements.
+
+    *TRANSFORM makes u' = R u the freedoms of a node, so that Abaqus writes R K Rᵀ. Contacts, supports, springs and
+    loads along x, y, z would act on u' as if it were u.
+    """
+    assert mesh.numbers is not None, "read from an Abaqus file"
+    if mesh.turned is None:
+        return
+    moving = labels.node[(labels.direction >= 1) & (labels.direction <= body.dimension)]
+    turned = np.intersect1d(mesh.numbers[mesh.turned], moving)
+    if len(turned):
+        which = f"node {turned[0]}" + (f" and {len(turned) - 1} more" if len(turned) > 1 else "")
+        accepted = (
+            f"*TRANSFORM gives {which} axes of their own, along which Abaqus writes the matrices; they must be in "
+            "global axes: write matrices and mesh without *TRANSFORM (if these matrices are in global axes, delete it "
+            "in the mesh's file only)"
+        )
+        raise CaseError(f"{where}.mesh", shown_path(Path(body.mesh or "")), accepted)
+
+
 def _node_numbers(where: str, body: MatrixBody, labels: Labels | None, mesh: Mesh | None) -> IntArray:
     """Numbers (k,) of the nodes whose displacements come first."""
     if labels is None:
@@ -306,6 +351,16 @@ def _indices(
     index[~moves] = d * len(numbers) + np.arange(np.count_nonzero(~moves))
     rest = zip(labels.node[~moves].tolist(), labels.direction[~moves].tolist(), strict=True)
     return index, [_extra_name(name, node, direction) for node, direction in rest]
+
+
+def _rotations(labels: Labels | None, numbers: IntArray, index: IntArray) -> IntArray:
+    """Rotations (r, 2) of the nodes of these numbers, as node and local freedom; index (n,): that of each label."""
+    if labels is None or not len(numbers):
+        return np.zeros((0, 2), dtype=np.int64)
+    order = np.argsort(numbers, kind="stable")
+    at = order[np.minimum(np.searchsorted(numbers[order], labels.node), len(numbers) - 1)]
+    mine = np.isin(labels.direction, _ROTATIONS) & (numbers[at] == labels.node)
+    return np.column_stack([at[mine], index[mine]])
 
 
 def _extra_name(name: str, node: int, direction: int) -> str:

@@ -56,10 +56,16 @@ def constraints_of(case: Case, bodies: dict[str, BuiltBody]) -> list[Constraint]
         lacking = set() if body.lacking is None else set((body.offset + body.lacking).tolist())
         moved = 0
         for direction in support.fixed:
-            component = body.stride - 1 if direction == "rotation" else _DIRECTIONS[direction]
+            if direction == "rotation":
+                along = body.rotations_of(nodes)
+                if not len(along):
+                    accepted = f"the matrices of {at.body} name no rotation there (freedoms 4 to 6 of a node)"
+                    raise CaseError(f"{where}.fixed", direction, accepted)
+            else:
+                along = body.offset + body.stride * nodes + _DIRECTIONS[direction]
             speed = float(support.velocity.get(direction, 0.0))
             distance = float(support.displacement.get(direction, 0.0))
-            for freedom in (body.offset + body.stride * nodes + component).tolist():
+            for freedom in along.tolist():
                 if freedom in lacking:
                     moved += bool(speed or distance)
                     continue

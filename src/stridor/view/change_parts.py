@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 from ..case import Case
 from ..digits import measured
@@ -89,7 +90,7 @@ def change_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
             "Change of the growth rate of each mode that grows, to first order; to the right more of the number makes "
             "it grow faster.",
             "Bars of the change of growth rate per per cent of each number of the case.",
-            sensitivity_bars(inputs.sensitivities),
+            partial(sensitivity_bars, inputs.sensitivities),
         )
     if inputs.measures is not None and inputs.measures.measures:
         yield ReportFigure(
@@ -98,7 +99,7 @@ def change_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
             "Growth rate that a per cent of each change takes away; diamonds: solved again with the change made, "
             "which come first.",
             "Bars of the growth rate removed per per cent of change, for each counter-measure.",
-            countermeasure_bars(inputs.measures),
+            partial(countermeasure_bars, inputs.measures),
         )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 from ..digits import hertz, readable
 from ..periodic import Cycle, CycleBranch, Cycles
@@ -103,7 +104,7 @@ def cycle_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
         + (" Cross: the run in time, over the last quarter of its last phase." if runs else "")
         + (f" The run in time is not drawn beside them: {inputs.beside_cycles}." if inputs.beside_cycles else ""),
         "Slip amplitude and frequency of limit cycles over the friction coefficient.",
-        cycle_branches(result, runs),
+        partial(cycle_branches, result, runs),
     )
     if not result.cycles:
         return
@@ -116,5 +117,5 @@ def cycle_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
         f"of contact {contact}, on the colour of what it does.",
         f"Normal and friction force and slip velocity of contact {contact} over one period, with stick, slip and "
         "separation shaded.",
-        cycle_period(cycle, contact),
+        partial(cycle_period, cycle, contact),
     )

@@ -183,28 +183,34 @@ def interface_energy(
     return figure
 
 
-def contact_energies(system: System, energy: Array) -> dict[str, Figure]:
-    """`interface_energy` of each contact over several nodes by its name: energy (m,) of a mode at the contact nodes of
-    a system, over the energy of the mode, with the edges of the slave as it slides."""
+def contacts_of_several_nodes(system: System) -> list[str]:
+    """Names of the contacts that have more than one node."""
     nodes = system.contact_nodes()
-    slip = nodes.slip_velocity(full_motion(system))
-    figures: dict[str, Figure] = {}
-    for k, name in enumerate(nodes.names):
-        mine = nodes.owner == k
-        if np.count_nonzero(mine) < 2:
-            continue
-        figures[name] = interface_energy(
-            nodes.position[mine],
-            energy[mine],
-            tangents=nodes.tangents[mine],
-            quantity="energy per cycle / that of the mode",
-            unit="",
-            slip=slip[mine],
-        )
-        if len(nodes.names) > 1:
-            ax = figures[name].axes[0]
-            ax.set_title(f"contact {name}: {ax.get_title(loc='left')}", loc="left", pad=22.0)
-    return figures
+    return [name for k, name in enumerate(nodes.names) if np.count_nonzero(nodes.owner == k) > 1]
+
+
+def contact_energies(system: System, energy: Array) -> dict[str, Figure]:
+    """`contact_energy` of each contact over several nodes by its name."""
+    return {name: contact_energy(system, energy, name) for name in contacts_of_several_nodes(system)}
+
+
+def contact_energy(system: System, energy: Array, name: str) -> Figure:
+    """`interface_energy` of a contact: energy (m,) of a mode at all contact nodes of a system, over the energy of the
+    mode, with the edges of the slave as it slides."""
+    nodes = system.contact_nodes()
+    mine = nodes.owner == nodes.names.index(name)
+    figure = interface_energy(
+        nodes.position[mine],
+        energy[mine],
+        tangents=nodes.tangents[mine],
+        quantity="energy per cycle / that of the mode",
+        unit="",
+        slip=nodes.slip_velocity(full_motion(system))[mine],
+    )
+    if len(nodes.names) > 1:
+        ax = figure.axes[0]
+        ax.set_title(f"contact {name}: {ax.get_title(loc='left')}", loc="left", pad=22.0)
+    return figure
 
 
 def _lengths(*coordinates: Array) -> tuple[list[Array], Unit]:

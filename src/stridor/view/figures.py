@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -26,7 +27,7 @@ def model_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
             "Bodies as lines, supports as squares with the directions they hold (φ: rotation), contacts as circles, "
             "loads and prescribed velocities as arrows, watched points as small circles.",
             f"Drawing of {', '.join(line.name for line in inputs.system.lines)} with supports, loads and contacts.",
-            plots.model_plot(inputs.system, inputs.case),
+            partial(plots.model_plot, inputs.system, inputs.case),
         )
     if inputs.system is not None and any(solid.cells.keys() - {"vertex"} for solid in inputs.system.solids):
         yield ReportFigure(
@@ -34,7 +35,7 @@ def model_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
             "The mesh",
             "Bodies as meshed, each in its colour; dots are the slave nodes of the contacts.",
             f"Drawing of the meshes of {', '.join(solid.name for solid in inputs.system.solids)}.",
-            plots.mesh(inputs.system),
+            partial(plots.mesh, inputs.system),
         )
 
 
@@ -66,7 +67,8 @@ def modal_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
             "coefficient; at a maximum two of them meet and become complex: all onsets of flutter are maxima of one "
             "explicit curve. Diamonds: the onsets, solved on the assembled matrices.",
             "Friction coefficient over frequency with its local maxima marked as onsets of instability.",
-            plots.friction_curve(
+            partial(
+                plots.friction_curve,
                 inputs.curve.mu,
                 inputs.curve.frequency_hz,
                 onsets=inputs.undamped_onsets,
@@ -90,7 +92,7 @@ def _undamped_pair(inputs: ReportInputs, modes: ComplexModes, onset: Onset) -> I
         f"μ = {measured(onset.mu, 5)}, {measured(onset.frequency_hz, 1)} Hz; "
         "beyond it they share one frequency and one of them grows (marked).",
         f"Frequencies of modes {a} and {b} over friction, merging at {measured(onset.mu, 4)}.",
-        plots.frequency_branches(modes, onset.branches, onsets=onsets),
+        partial(plots.frequency_branches, modes, onset.branches, onsets=onsets),
     )
     yield ReportFigure(
         "imaginary-pair",
@@ -98,7 +100,7 @@ def _undamped_pair(inputs: ReportInputs, modes: ComplexModes, onset: Onset) -> I
         "For motion written as exp(jωt), a negative imaginary part of ω grows: Im ω = −Re λ. Below the onset both are "
         "real; beyond it the pair opens as the square root of μ − μc.",
         f"Imaginary parts of modes {a} and {b}, zero up to {measured(onset.mu, 4)}, then opening like a square root.",
-        plots.growth_branches(modes, onset.branches, imaginary_frequency=True),
+        partial(plots.growth_branches, modes, onset.branches, imaginary_frequency=True),
     )
 
 
@@ -115,14 +117,14 @@ def _damped_pair(inputs: ReportInputs, modes: ComplexModes, onset: Onset) -> Ite
         f"Frequencies of modes {a} and {b}, with structural damping",
         "Im λ/2π of the damped pair: the frequencies come close without being exactly equal." + where,
         f"Damped frequencies of modes {a} and {b} over friction.",
-        plots.frequency_branches(modes, onset.branches, onsets=inputs.damped_onsets),
+        partial(plots.frequency_branches, modes, onset.branches, onsets=inputs.damped_onsets),
     )
     yield ReportFigure(
         "damped-growth-pair",
         f"Growth rates of modes {a} and {b}, with structural damping",
         "Re λ of the damped pair; positive grows." + where + _beside_undamped(crossing, _of_pair(inputs, onset)),
         f"Growth rates of modes {a} and {b} over friction, one becoming positive.",
-        plots.growth_branches(modes, onset.branches),
+        partial(plots.growth_branches, modes, onset.branches),
     )
 
 
@@ -169,7 +171,7 @@ def _all_branches(inputs: ReportInputs) -> Iterator[ReportFigure]:
             + ("A line that ends was not followed any further, as where other nodes touch. " if parted else "")
             + "Circles: potentially unstable (the mode grows). Diamonds: onsets, solved.",
             f"Frequencies of {counted(shown, 'mode')} over the friction coefficient with unstable stretches marked.",
-            plots.frequency_branches(modes, onsets=onsets, max_frequency_hz=inputs.max_frequency_hz),
+            partial(plots.frequency_branches, modes, onsets=onsets, max_frequency_hz=inputs.max_frequency_hz),
         )
     if inputs.damped_sweep is not None and len(inputs.damped_sweep.mu) > 1:
         yield ReportFigure(
@@ -178,7 +180,7 @@ def _all_branches(inputs: ReportInputs) -> Iterator[ReportFigure]:
             f"Eigenvalues as friction grows, {inputs.damping_of(inputs.damped_sweep)}. The horizontal axis is "
             "linear near zero and logarithmic beyond.",
             "Eigenvalues in the plane of growth rate and frequency, coloured by friction coefficient.",
-            plots.root_locus(inputs.damped_sweep, max_frequency_hz=inputs.max_frequency_hz),
+            partial(plots.root_locus, inputs.damped_sweep, max_frequency_hz=inputs.max_frequency_hz),
         )
 
 
@@ -195,7 +197,7 @@ def temporal_figures(inputs: ReportInputs, window: Window | None) -> Iterator[Re
             f"{frequency_words(inputs.max_frequency_hz)}, the light one everything the time step resolves, impacts "
             "included. Dotted lines: where phases begin.",
             f"Acceleration of {point} along {along} over time with the phases of the run marked.",
-            plots.acceleration_history(run, point, direction=along, max_frequency_hz=inputs.max_frequency_hz),
+            partial(plots.acceleration_history, run, point, direction=along, max_frequency_hz=inputs.max_frequency_hz),
         )
     if run is not None and run.contact_names and len(run.time) > 1:
         for k, name in enumerate(run.contact_names):
@@ -204,7 +206,7 @@ def temporal_figures(inputs: ReportInputs, window: Window | None) -> Iterator[Re
                 f"Contact {name} over the whole run",
                 "Normal force and slip velocity of the slave against the master, extrema of every short piece.",
                 f"Normal force and slip velocity of contact {name} over time.",
-                plots.contact_history(run, contact=k),
+                partial(plots.contact_history, run, contact=k),
             )
     yield from _spectra(inputs)
     if run is not None and window is not None:
@@ -218,7 +220,7 @@ def temporal_figures(inputs: ReportInputs, window: Window | None) -> Iterator[Re
             "Below: what is missing in the balance, "
             "relative to the largest energy that changed hands.",
             "Energies over time, and the imbalance of the energy balance.",
-            plots.energy_plot(run, inputs.energy),
+            partial(plots.energy_plot, run, inputs.energy),
         )
 
 
@@ -232,7 +234,8 @@ def _spectra(inputs: ReportInputs) -> Iterator[ReportFigure]:
             f"{measured(spec.bandwidth_hz, 1)} Hz wide at −6 dB. 0 dB is an amplitude of 1 {inputs.spectra_unit}."
             + (" Dotted: the dominant frequency and its multiples." if inputs.dominant_hz is not None else ""),
             f"Amplitude spectra of {', '.join(inputs.spectra)}.",
-            plots.spectrum_plot(
+            partial(
+                plots.spectrum_plot,
                 inputs.spectra,
                 max_frequency_hz=inputs.max_frequency_hz,
                 unit=inputs.spectra_unit,
@@ -247,7 +250,8 @@ def _spectra(inputs: ReportInputs) -> Iterator[ReportFigure]:
             f"Of the {inputs.spectrogram_of}; resolution {measured(content.resolution_hz, 0)} Hz. How the tone builds "
             "up, and its multiples with it.",
             "Spectrum over time as a colour map.",
-            plots.spectrogram_plot(
+            partial(
+                plots.spectrogram_plot,
                 content,
                 start=inputs.spectrogram_start,
                 max_frequency_hz=inputs.max_frequency_hz,
@@ -281,7 +285,8 @@ def _contact_window(inputs: ReportInputs, window: Window) -> Iterator[ReportFigu
         f"Normal force and velocities over {window.length}",
         caption,
         f"Normal force and tangential velocities of contact {name} over {window.length}; stick and slip shaded.",
-        plots.contact_force_and_velocity(
+        partial(
+            plots.contact_force_and_velocity,
             run,
             window,
             slave=slave if slave in run.watch_names else None,
@@ -294,7 +299,7 @@ def _contact_window(inputs: ReportInputs, window: Window) -> Iterator[ReportFigu
         "Normal force over slip velocity",
         f"The same {window.length}. On the vertical line at zero the contact sticks.",
         f"Normal force over slip velocity of contact {name}.",
-        plots.phase_portrait(run, window),
+        partial(plots.phase_portrait, run, window),
     )
 
 
@@ -312,7 +317,13 @@ def agreement_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
                 "exponentials found in the slip speed of a small perturbation, marched in time. Every cross inside a "
                 "circle is a mode that both approaches see alike.",
                 "Complex modes and identified components in the plane of frequency and growth rate.",
-                plots.spectrum_map(inputs.modes, chosen.perturbation.components, mu=chosen.mu, max_frequency_hz=top),
+                partial(
+                    plots.spectrum_map,
+                    inputs.modes,
+                    chosen.perturbation.components,
+                    mu=chosen.mu,
+                    max_frequency_hz=top,
+                ),
             )
         if len(chosen.perturbation.signal) > 1:
             yield ReportFigure(
@@ -322,7 +333,8 @@ def agreement_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
                 f"dashed line has the slope of the modal growth rate. Grey: what lies above {frequency_words(top)}, "
                 "out of the range compared, may grow as well.",
                 "Size of the perturbation over time on a logarithmic scale beside the modal growth rate.",
-                plots.perturbation_growth(
+                partial(
+                    plots.perturbation_growth,
                     chosen.perturbation, modal_growth_rate=chosen.modal_eigenvalue.real, max_frequency_hz=top
                 ),
             )
@@ -332,7 +344,7 @@ def agreement_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
             "Growth rates by both approaches",
             "Circles: the mode that grows fastest. Crosses: the fastest component of a small perturbation in time.",
             "Growth rates of both approaches over the friction coefficient.",
-            plots.growth_comparison(comparisons),
+            partial(plots.growth_comparison, comparisons),
         )
     yield from _shape_figures(inputs)
 
@@ -348,7 +360,7 @@ def _shape_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
             "The line at the dominant frequency taken out of the velocity of every node. Arrows: velocities; thin "
             "lines: a quarter of a period later; dotted: at rest.",
             f"Velocity shape of the bodies at {measured(operating.frequency_hz, 0)} Hz from the run in time.",
-            plots.mode_shape(system, operating.shape, velocity=True),
+            partial(plots.mode_shape, system, operating.shape, velocity=True),
         )
     if mode is not None and system.lines:
         growth = f", growth rate {measured(mode.growth_rate, 0)} 1/s" if mode.growth_rate is not None else ""
@@ -358,7 +370,7 @@ def _shape_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
             f"Displacements{growth}, drawn where the motion is largest and, thin, a quarter of a period later: "
             "the mode is complex, the bodies do not move in phase.",
             f"Deformed bodies in the mode at {measured(mode.frequency_hz, 0)} Hz.",
-            plots.mode_shape(system, mode.shape),
+            partial(plots.mode_shape, system, mode.shape),
         )
     if operating is not None and mode is not None:
         by_body = ", ".join(f"{name} {value:.2f}" for name, value in inputs.mac_by_body.items())
@@ -368,7 +380,8 @@ def _shape_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
             "Both shapes side by side",
             "Left the velocities of the run, right the mode, turned to agree in sign." + extra,
             "Operating shape of the run beside the unstable mode.",
-            plots.shapes_side_by_side(
+            partial(
+                plots.shapes_side_by_side,
                 system,
                 [
                     (f"run, {measured(operating.frequency_hz, 0)} Hz", operating.shape, True),

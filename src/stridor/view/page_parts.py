@@ -5,8 +5,9 @@ from __future__ import annotations
 import base64
 import io
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, Literal
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
@@ -24,13 +25,19 @@ Kind = Literal["svg", "png"]
 
 @dataclass(frozen=True)
 class ReportFigure:
-    """A figure: name (its file and anchor), title, caption, alternative text, the drawing."""
+    """A figure: name (its file and anchor), title, caption, alternative text, the drawing or what draws it when it is
+    wanted."""
 
     name: str
     title: str
     caption: str
     alt: str
-    figure: Figure
+    drawing: Figure | Callable[[], Figure]
+
+    @cached_property
+    def figure(self) -> Figure:
+        """The drawing, made at most once."""
+        return self.drawing if isinstance(self.drawing, Figure) else self.drawing()
 
 
 def filled(template: str, **content: Any) -> str:

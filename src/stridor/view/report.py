@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
 from ..case.repeating import in_alike, repeating
+from ..mesh.paths import in_one_line
 from ..stages import passing, stage
 from .body_words import bodies_table
 from .change_parts import change_figures, change_tables, change_words, mechanism_table
@@ -52,22 +53,32 @@ class Chapter:
 def write_report(inputs: ReportInputs, folder: Path) -> Path:
     """Write folder/report.html and folder/figures/NAME.png and .svg; the path of the page.
 
-    Each file appears whole or not at all. Raises OSError where the folder cannot be written.
+    Each file appears whole or not at all, and what cannot be drawn is named in its chapter. Raises OSError where the
+    folder cannot be written.
     """
     folder = Path(folder)
     figures = folder / "figures"
     figures.mkdir(parents=True, exist_ok=True)
     stage("tables and figures of the page")
-    chapters = sections(inputs)
+    chapters: list[Chapter] = []
     drawings: dict[str, str] = {}
-    for part in (p for chapter in chapters for p in chapter.parts):
-        if isinstance(part, ReportFigure):
+    for chapter in sections(inputs):
+        undrawn: dict[str, str] = {}
+        for part in chapter.parts:
+            if not isinstance(part, ReportFigure):
+                continue
             stage(f"figure {part.name}, as SVG and PNG", logged=False)
-            lay_out(part.figure)
-            vector = rendered(part.figure, "svg")
+            try:
+                lay_out(part.figure)
+                vector, points = rendered(part.figure, "svg"), rendered(part.figure, "png")
+            except Exception as error:  # whatever one figure fails of, the others and the tables are there
+                undrawn[part.name] = f"Not drawn: {part.title}, {type(error).__name__}: {in_one_line(error)}"
+                continue
             _write(figures / f"{part.name}.svg", vector)
-            _write(figures / f"{part.name}.png", rendered(part.figure, "png"))
+            _write(figures / f"{part.name}.png", points)
             drawings[part.name] = data_url(vector, "svg")
+        drawn = tuple(part for part in chapter.parts if part.name not in undrawn or isinstance(part, Table))
+        chapters.append(replace(chapter, lines=(*chapter.lines, *undrawn.values()), parts=drawn))
     page = folder / "report.html"
     _write(page, render(inputs, chapters, drawings).encode("utf-8"))
     return page

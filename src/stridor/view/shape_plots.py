@@ -24,7 +24,8 @@ ARROWS = 16  # along a line, at most
 
 @styled
 def model_plot(system: System, case: Case | None = None, *, ax: Axes | None = None) -> Figure:
-    """The model as it stands: bodies, contacts, and with the case its supports, loads and watched points."""
+    """The model as it stands: lines, point masses, contacts, and with the case its supports, loads and watched
+    points."""
     figure, ax = panel(ax, 3.4)
     reach = _extent(system)
     unit, its_name = length_unit(reach)
@@ -41,6 +42,20 @@ def model_plot(system: System, case: Case | None = None, *, ax: Axes | None = No
             textcoords="offset points",
             color=colour,
             ha="left" if across[0] > 0.5 else "center",
+            va="center",
+            fontweight="bold",
+        )
+    masses = [solid for solid in system.solids if not solid.cells.keys() - {"vertex"}]
+    for index, mass in enumerate(masses, start=len(system.lines)):
+        colour = COLOURS[index % len(COLOURS)]
+        at = mass.points[0] / unit
+        ax.plot(*at, "o", color=colour, mec=INK, ms=6.5, mew=0.8, zorder=4)
+        ax.annotate(
+            mass.name,
+            (at[0], at[1]),
+            xytext=(8, 0),
+            textcoords="offset points",
+            color=colour,
             va="center",
             fontweight="bold",
         )

@@ -1,4 +1,5 @@
-"""What of a System can be seen: the outer facets of its solids, its lines, and how both move with a vector."""
+"""What of a System can be seen: the outer facets of its solids, its lines and point masses, and how they move with a
+vector."""
 
 from __future__ import annotations
 
@@ -37,12 +38,12 @@ SOLID: dict[str, tuple[tuple[int, ...], ...]] = {
 class Skin:
     """The visible surface of a system of dimension d = 2 or 3, all bodies in one list.
 
-    names: bodies, the meshed ones first, then the lines. points (k, d) [m]: only those that are drawn. facets (f, 4)
-    index them, triangles repeat their last corner; in the plane they are the cells, in space the outer facets, corners
-    counter-clockwise seen from outside; closed: whether they all bound volumes, so that those facing away are hidden.
-    body (f,) and point_body (k,) index names. edges (e, 2): the outline in the
-    plane, none in space; segments (s, 2) with segment_body (s,): the pieces of the lines. motion (k, d) is the complex
-    displacement [m] of a vector, zero without one.
+    names: bodies, the meshed ones first, then point masses, then the lines. points (k, d) [m]: only those that are
+    drawn. facets (f, 4) index them, triangles repeat their last corner; in the plane they are the cells, in space the
+    outer facets, corners counter-clockwise seen from outside; closed: whether they all bound volumes, so that those
+    facing away are hidden. body (f,) and point_body (k,) index names. edges (e, 2): the outline in the plane, none in
+    space; segments (s, 2) with segment_body (s,): the pieces of the lines, and for each point mass one that begins and
+    ends at its point. motion (k, d) is the complex displacement [m] of a vector, zero without one.
     """
 
     names: tuple[str, ...]
@@ -62,6 +63,11 @@ class Skin:
         return int(self.points.shape[1])
 
     @property
+    def lone(self) -> IntArray:
+        """Segments (m,) that are point masses."""
+        return np.flatnonzero(self.segments[:, 0] == self.segments[:, 1])
+
+    @property
     def triangles(self) -> int:
         """How many the facets are drawn as."""
         return len(self.facets) + int(np.count_nonzero(self.facets[:, 3] != self.facets[:, 2]))
@@ -76,7 +82,7 @@ def skin_of(system: System, vector: Array | ComplexArray | None = None) -> Skin:
     """The visible surface of a system moving with ``vector`` (n,).
 
     Raises CaseError for a vector of another length or with values that are not finite, for a system that has neither
-    solids nor lines, and for cells of a kind that is not known.
+    solids nor lines (point masses alone are no shape), and for cells of a kind that is not known.
     """
     moving = checked_vector(system, vector)
     points: list[Array] = []
@@ -85,7 +91,11 @@ def skin_of(system: System, vector: Array | ComplexArray | None = None) -> Skin:
     edges: list[IntArray] = []
     owner: list[IntArray] = []
     start = 0
-    for index, solid in enumerate(system.solids):
+    masses = [solid for solid in system.solids if not solid.cells.keys() - {"vertex"}]
+    solids = [solid for solid in system.solids if solid.cells.keys() - {"vertex"}]
+    if not solids and not system.lines:
+        raise CaseError("system", None, "has neither solids nor lines, so there is nothing to draw")
+    for index, solid in enumerate(solids):
         found = surface_facets(solid.cells, int(solid.points.shape[1]))
         used, inverse = np.unique(found, return_inverse=True)
         local = inverse.reshape(found.shape) + start
@@ -97,6 +107,12 @@ def skin_of(system: System, vector: Array | ComplexArray | None = None) -> Skin:
         start += len(used)
     pieces: list[IntArray] = []
     piece_owner: list[IntArray] = []
+    for index, mass in enumerate(masses, start=len(solids)):
+        points.append(mass.points)
+        motion.append((mass.rows.free @ moving).reshape(mass.points.shape))
+        pieces.append(np.repeat(start + np.arange(len(mass.points)), 2).reshape(-1, 2))
+        piece_owner.append(np.full(len(mass.points), index))
+        start += len(mass.points)
     for index, line in enumerate(system.lines, start=len(system.solids)):
         count, width = line.coordinates.shape
         pad = ((0, 0), (0, system.dimension - width))
@@ -105,11 +121,9 @@ def skin_of(system: System, vector: Array | ComplexArray | None = None) -> Skin:
         pieces.append(start + np.column_stack([np.arange(count - 1), np.arange(1, count)]))
         piece_owner.append(np.full(count - 1, index))
         start += count
-    if not points:
-        raise CaseError("system", None, "has neither solids nor lines, so there is nothing to draw")
     none = np.zeros((0, 2), dtype=np.int64)
     return Skin(
-        names=(*(s.name for s in system.solids), *(line.name for line in system.lines)),
+        names=tuple(body.name for body in (*solids, *masses, *system.lines)),
         points=np.concatenate(points),
         point_body=np.repeat(np.arange(len(points)), [len(p) for p in points]),
         facets=np.concatenate([np.zeros((0, 4), dtype=np.int64), *facets]),
@@ -118,7 +132,7 @@ def skin_of(system: System, vector: Array | ComplexArray | None = None) -> Skin:
         segments=np.concatenate([none, *pieces]),
         segment_body=np.concatenate([none[:, 0], *piece_owner]),
         motion=np.concatenate(motion),
-        closed=all(kind in SOLID for s in system.solids for kind in s.cells),
+        closed=all(kind in SOLID for s in solids for kind in s.cells),
     )
 
 

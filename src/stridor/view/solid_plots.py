@@ -40,6 +40,7 @@ from .style import WIDTH, legend_above, new_figure, root_figure, styled
 from .units import Unit, extent, length_unit
 
 AMPLITUDES = "viridis"
+MASS = 46.0  # of the dot of a point mass [square points]
 PIXELS = 1100  # of a solid in space, along the longer side
 
 
@@ -124,6 +125,7 @@ def draw_frame(
     else:
         _picture(ax, skin, moved, colours(size)[:, :3], reach, unit[0], pixels)
         outline = np.concatenate([sharp_edges(skin.points, skin.facets), skin.segments])
+    _masses_at_rest(ax, skin, rest, unit[0])
     _lines(ax, skin, moved, colours(size[skin.segments].mean(axis=1))[:, :3], unit[0])
     pieces = list(rest[outline, :2] / unit[0])
     ax.add_collection(LineCollection(pieces, colors=GREY, linewidths=0.8, linestyles=":", alpha=0.8, zorder=2.5))
@@ -226,9 +228,21 @@ def _smooth(ax: Axes, skin: Skin, points: Array, values: Array, unit: float) -> 
 
 
 def _lines(ax: Axes, skin: Skin, shown: Array, colours: Array, unit: float) -> None:
-    if len(skin.segments):
-        pieces = list(shown[skin.segments, :2] / unit)
-        ax.add_collection(LineCollection(pieces, colors=list(colours), linewidths=3.2, capstyle="round", zorder=3))
+    """Lines, and point masses as dots, before all that is behind them."""
+    if not len(skin.segments):
+        return
+    pieces = list(shown[skin.segments, :2] / unit)
+    ax.add_collection(LineCollection(pieces, colors=list(colours), linewidths=3.2, capstyle="round", zorder=3))
+    if len(skin.lone):
+        at = shown[skin.segments[skin.lone, 0], :2] / unit
+        ax.scatter(at[:, 0], at[:, 1], s=MASS, c=list(colours[skin.lone]), edgecolors=INK, linewidths=0.8, zorder=4)
+
+
+def _masses_at_rest(ax: Axes, skin: Skin, rest: Array, unit: float) -> None:
+    """Where point masses are at rest."""
+    if len(skin.lone):
+        at = rest[skin.segments[skin.lone, 0], :2] / unit
+        ax.scatter(at[:, 0], at[:, 1], s=MASS, c="none", edgecolors=GREY, linewidths=0.8, alpha=0.8, zorder=2.5)
 
 
 def _lengths(ax: Axes, camera: Camera | None, unit: Unit) -> None:
@@ -266,11 +280,16 @@ def _round_length(most: float) -> float:
 def _legend(ax: Axes, skin: Skin, *, contact_nodes: int) -> None:
     handles: list[Any] = []
     meshed = int(skin.body.max(initial=-1)) + 1
+    masses = set(skin.segment_body[skin.lone].tolist())
     for k, name in enumerate(skin.names):
         colour = body_colour(k)
         pale = tuple(0.65 * np.array(to_rgb(colour)) + 0.35)
-        handle = Patch(facecolor=pale, edgecolor=colour, label=name)
-        handles.append(handle if k < meshed else Line2D([], [], color=colour, linewidth=3, label=name))
+        handle: Any = Patch(facecolor=pale, edgecolor=colour, label=name)
+        if k in masses:
+            handle = Line2D([], [], color=colour, marker="o", mec=INK, ms=6.5, linestyle="none", label=name)
+        elif k >= meshed:
+            handle = Line2D([], [], color=colour, linewidth=3, label=name)
+        handles.append(handle)
     if contact_nodes:
         text = f"{contact_nodes} contact node{'s' if contact_nodes > 1 else ''}"
         handles.append(Line2D([], [], color=INK, marker="o", ms=3.5, linestyle="none", label=text))

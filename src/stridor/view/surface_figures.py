@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from ..digits import measured
 from ..system import System
 from ..typing import ComplexArray
 from . import plots
-from .field_plots import contact_energies
+from .field_plots import contact_energy, contacts_of_several_nodes
 from .inputs import ReportInputs
 from .page_parts import ReportFigure
 from .tables import Table, TableRow, drop_empty, number, quantity, significant
@@ -32,14 +33,20 @@ def shape_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
             f"At the friction of the case this mode {said}. Drawn at the instant of largest motion, exaggerated, "
             f"coloured by the displacement. {_shares(system, inputs.shape_vector)}",
             f"Deformed meshes in the mode at {measured(shape.frequency_hz, 0)} Hz.",
-            plots.solid_mode_shape(system, inputs.shape_vector, frequency_hz=shape.frequency_hz, growth_rate=growth),
+            partial(
+                plots.solid_mode_shape,
+                system,
+                inputs.shape_vector,
+                frequency_hz=shape.frequency_hz,
+                growth_rate=growth,
+            ),
         )
     nodes = system.contact_nodes()
     if inputs.friction_energy is None or nodes.count < 2:
         return
-    drawn = contact_energies(system, inputs.friction_energy)
-    for name, figure in drawn.items():
-        one = len(drawn) == 1
+    several = contacts_of_several_nodes(system)
+    for name in several:
+        one = len(several) == 1
         yield ReportFigure(
             "friction-energy" if one else f"friction-energy-{name}",
             "Where the squeal is made" if one else f"Where the squeal is made, contact {name}",
@@ -47,7 +54,7 @@ def shape_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
             "relative to the energy of the mode. Arrows: how the material of the other body goes, which meets the "
             "leading edge first.",
             f"Map of the energy that friction feeds in over contact {name}.",
-            figure,
+            partial(contact_energy, system, inputs.friction_energy, name),
         )
 
 
@@ -75,7 +82,7 @@ def contact_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
             f"Contact pressure of {name} over time",
             "Position along the interface across, time upwards; in space, nodes at the same place along it are one.",
             f"Space-time picture of the contact pressure of {name}.",
-            plots.contact_map(history, name, quantity="pressure"),
+            partial(plots.contact_map, history, name, quantity="pressure"),
         )
         yield ReportFigure(
             f"status-{name}",
@@ -83,7 +90,7 @@ def contact_figures(inputs: ReportInputs) -> Iterator[ReportFigure]:
             "The same for the status of the nodes: waves of stick and separation run through the interface as "
             "slanted bands.",
             f"Space-time picture of stick, slip and separation of {name}.",
-            plots.contact_map(history, name, quantity="status"),
+            partial(plots.contact_map, history, name, quantity="status"),
         )
 
 

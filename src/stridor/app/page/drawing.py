@@ -8,7 +8,7 @@ from html import escape
 import numpy as np
 
 from ...case import Case, PointRef
-from ...case.bodies import BeamBody
+from ...case.bodies import BeamBody, MassBody
 from ...errors import CaseError
 from ...system import System
 from ...typing import Array
@@ -19,6 +19,7 @@ from .mesh_marks import held_nodes, pushes, slides
 WIDTH = 300.0  # units of the drawing, which the page fits into its column
 MARGIN = 46.0  # around the model, for supports, arrows and words
 ARROW = 30.0
+MASS = 5.0  # radius of a point mass
 MOST_FACETS = 4000  # of meshed bodies, beyond which only some are drawn
 TALLEST = 1.0  # height over width, at most
 
@@ -86,6 +87,10 @@ def drawing(case: Case, system: System) -> str:
     names = list(skin.names)
     sheet.words.append(f"bodies {', '.join(names)}")
     _draw_mesh(sheet, skin, seen)
+    for s in skin.lone.tolist():
+        x, y = sheet.at(seen[skin.segments[s, 0]])
+        colour = COLOURS[int(skin.segment_body[s]) % len(COLOURS)]
+        sheet.parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{MASS:g}" fill="{colour}"/>')
     middles: list[tuple[float, float, str]] = []
     for index, name in enumerate(names):
         body = case.bodies.get(name)
@@ -93,6 +98,8 @@ def drawing(case: Case, system: System) -> str:
             _draw_beam(sheet, name, body, COLOURS[index % len(COLOURS)])
         elif skin.dimension == 2 or len(names) > 1:
             x, y = sheet.at(seen[skin.point_body == index].mean(axis=0))
+            if isinstance(body, MassBody):
+                y += MASS + 9
             middles.append((y, x, name))
     for y, x, name in sorted(middles):  # those above before those that make way for them
         sheet.name(x, y, name)

@@ -220,8 +220,13 @@ function lines() {
     const a = segments[2 * s], b = segments[2 * s + 1];
     const level = Math.round(((size[a] + size[b]) / 2) * (data.ramp.length - 1));
     const colour = control("colours").value === "size" ? data.ramp[level] : data.colours[segmentBody[s]];
-    context.strokeStyle = `rgb(${colour.join(",")})`;
+    context.strokeStyle = context.fillStyle = `rgb(${colour.join(",")})`;
     context.beginPath();
+    if (a === b) { // a point mass; a line without length is not drawn
+      context.arc(seen[3 * a], seen[3 * a + 1], 1.2 * context.lineWidth, 0, 2 * Math.PI);
+      context.fill();
+      continue;
+    }
     context.moveTo(seen[3 * a], seen[3 * a + 1]);
     context.lineTo(seen[3 * b], seen[3 * b + 1]);
     context.stroke();
