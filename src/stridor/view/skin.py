@@ -247,5 +247,6 @@ def mode_title(frequency_hz: float | None, growth_rate: float | None) -> str:
         words.append(f"{frequency_hz / unit:.4g} {its_name}")
     if growth_rate is not None:
         kind = "unstable: grows" if growth_rate > 0 else "stable: decays" if growth_rate < 0 else "neutral"
-        words.append(f"growth rate {growth_rate:+.4g} 1/s ({kind})")
+        rate = f"{growth_rate:+.4g}" if growth_rate else "0"
+        words.append(f"growth rate {rate} 1/s ({kind})")
     return ", ".join(words)
