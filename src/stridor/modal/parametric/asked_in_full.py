@@ -25,7 +25,7 @@ from .basis import real_and_imaginary
 from .greedy import GUARD, Greedy, Point
 from .problem import CORNERS, ParametricProblem
 
-SMALL = 3000  # freedoms up to which the middle and all corners are asked, whatever the basis has there
+SMALL = 3000  # freedoms up to which the middle and the corners are asked, whatever the basis has there
 DECAY = 0.01  # of the band: modes that decay faster are asked for only where the basis has none at all
 NEAR = 1e-3  # of the band: eigenvalues further apart are not the same mode
 ROUNDS = 5  # of asking at one point
@@ -36,16 +36,16 @@ def complete(greedy: Greedy, grid: list[Point], *, sure: bool, solver: str | Non
     """Modes of the full problem that the basis lacks, taken in until it lacks none where that is asked.
 
     It is asked at the middle and the corners of the box, of small problems at all points of the grid, wherever the
-    basis has no mode of the band; and at the middle in any case, of small problems at the corners too, unless whoever
-    uses the model counts in the full problem (not ``sure``). grid: points at which every mode passes, which they do
-    again after that. Raises AnalysisError where they do not.
+    basis has no mode of the band; of small problems at the middle and the corners in any case, unless whoever uses the
+    model counts in the full problem (not ``sure``). grid: points at which every mode passes, which they do again after
+    that. Raises AnalysisError where they do not.
     """
     problem = greedy.problem
     if problem.size > AFFORDABLE:
         return
     small, points, places = problem.size <= SMALL, list(grid), _places(problem)
     for k, point in enumerate([*places, *(p for p in grid if small and p not in places)]):
-        always = sure and (k == 0 or (small and k < len(places)))
+        always = sure and small and k < len(places)
         for number in range(ROUNDS):
             # Once, what may come down into the band between the points that are asked.
             lacking = _lacking(greedy, point, always=always, above=not number, solver=solver)
@@ -80,10 +80,11 @@ def _lacking(
     """Real columns (n, k) of modes of the full problem at a point, right and left, that the basis lacks, and whether
     one of them is in the band; None where it has them all, and where they are not asked for. above: where the basis has
     no mode, those a little above the band as well."""
-    ours, top = greedy.values(point), greedy.frequency
-    empty = not np.any(np.abs(ours) <= top)
+    top = greedy.frequency
+    empty = not np.any(np.abs(greedy.known(point)) <= top)
     if not (empty or always):
         return None
+    ours = greedy.values(point)
     whole, decay = greedy.problem.at(point), 1.0 if empty else DECAY
     reach = GUARD * top if empty and above else top
     found = _found(whole, reach, decay, left=False, solver=solver)

@@ -115,6 +115,11 @@ class Greedy:
             "the reduced model does not settle over the box; ask for a smaller box, a lower frequency or a larger bound"
         )
 
+    def known(self, point: Point) -> ComplexArray:
+        """The eigenvalues (k,) at a point as it passed, perhaps on the basis as it was then."""
+        found = next((modes for other, modes in reversed(self.passed) if other == point), None)
+        return self.values(point) if found is None else found.values
+
     def values(self, point: Point) -> ComplexArray:
         """The eigenvalues (k,) at a point on the basis as it is."""
         return self._solved(self._matrices(point)).values
