@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from stridor.errors import AnalysisError
 from stridor.modal.full import counted, onsets_along, parametric_onsets, search
-from stridor.modal.parametric import Parameter, ParametricProblem, Term, reduce
+from stridor.modal.parametric import Parameter, ParametricProblem, Term, all_freedoms, reduce
 from stridor.modal.parametric.factors import CONSTANT, Product
 from stridor.typing import Array, ComplexArray
 
@@ -220,6 +220,17 @@ def test_counting_that_loses_an_onset_is_not_called_whole(monkeypatch: pytest.Mo
     assert len(fewer) < len(found)
     assert not fewer.complete
     assert fewer.sentence.startswith("Not complete")
+
+
+def test_growth_that_has_begun_by_less_than_rounding_is_confirmed_at_the_low_end():
+    """λ² − 1.5e-5 p λ + 1 = 0 from p = 1e-4 on grows all along, at the low end by less than rounding."""
+    made = [(np.eye(1), "mass", CONSTANT), (np.eye(1), "stiffness", CONSTANT), (np.array([[-1.5e-5]]), "damping", P)]
+    terms = tuple(Term(sp.csr_array(m), role, f, symmetric=True) for m, role, f in made)
+    whole = ParametricProblem(terms, (Parameter("p", 1e-4, 1.0, 0.5),))
+    found = onsets_along(all_freedoms(whole, 1.0), "p")
+    assert [(o.value, o.stabilising) for o in found] == [(1e-4, False)]
+    assert found[0].growth_slope == pytest.approx(0.75e-5)
+    assert found.complete
 
 
 def test_what_is_left_out_unconfirmed_is_not_called_complete(monkeypatch: pytest.MonkeyPatch):

@@ -343,10 +343,12 @@ def _roots(
     if onset.kind == "divergence":
         yield standstill(full, s, x, y, between)
         return
-    if onset.growth_slope == 0.0:
+    if onset.growth_slope == 0.0 or (s == full.low and not onset.stabilising):
+        # Growth that opens at the low end, or has begun before it by less than rounding, is no root in the range.
         opened = told(full, lam, x, y)
         yield None if opened is None else opened.root
-        return
+        if onset.growth_slope == 0.0:
+            return
     if not full.reversible:
         yield crossing(full, s, lam, x, y, between)
     yield meeting(full, s, lam, x, y, between)
