@@ -116,12 +116,24 @@ def _lacking(answer: Answer, name: str, value: Callable[[float], float]) -> str:
     if not answer.lacks:
         return "what was counted there is not the same"
     differences = [
-        f"between {name} = {value(lack.low):.6g} and {value(lack.high):.6g} the number of growing roots changes by "
-        f"{lack.seen:+d}, and by the onsets by {lack.said:+d}"
+        f"between {name} = {' and '.join(_apart(value(lack.low), value(lack.high)))} the number of growing roots changes "
+        f"by {_signed(lack.seen)}, and by the onsets by {_signed(lack.said)}"
         for lack in answer.lacks[:MOST]
     ]
     more = len(answer.lacks) - len(differences)
     return "; ".join([*differences, *([f"and in {more} more places"] if more else [])])
+
+
+def _apart(low: float, high: float) -> tuple[str, str]:
+    """Both ends of an interval with as many digits, six at least, as tell them apart."""
+    for digits in range(6, 17):
+        if (told := (f"{low:.{digits}g}", f"{high:.{digits}g}"))[0] != told[1]:
+            return told
+    return f"{low!r}", f"{high!r}"
+
+
+def _signed(number: int) -> str:
+    return f"{number:+d}" if number else "0"
 
 
 def _passing(passing: tuple[Passing, ...], name: str, value: Callable[[float], float]) -> str:
