@@ -116,8 +116,8 @@ def _lacking(answer: Answer, name: str, value: Callable[[float], float]) -> str:
     if not answer.lacks:
         return "what was counted there is not the same"
     differences = [
-        f"between {name} = {' and '.join(_apart(value(lack.low), value(lack.high)))} the number of growing roots changes "
-        f"by {_signed(lack.seen)}, and by the onsets by {_signed(lack.said)}"
+        f"between {name} = {' and '.join(_apart(value(lack.low), value(lack.high)))} the number of growing roots "
+        f"changes by {_signed(lack.seen)}, and by the onsets by {_signed(lack.said)}"
         for lack in answer.lacks[:MOST]
     ]
     more = len(answer.lacks) - len(differences)
