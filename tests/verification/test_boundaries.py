@@ -411,6 +411,16 @@ def test_an_end_without_any_damping_is_left_out(tmp_path: Path) -> None:
 
 
 # -- random problems ---------------------------------------------------------------------------------------------------
+def test_growth_that_begins_on_the_edges_leaves_no_curve(tmp_path: Path) -> None:
+    """A damping −x y/10 of one mass: it grows wherever x y > 0, and curves lie on x = 0 and y = 0, which are left out.
+    Lines find the onset at their end, whose point on the curve lies outside of the rectangle."""
+    terms = [(np.eye(1), "mass", ""), (np.eye(1), "stiffness", ""), (np.array([[-0.1]]), "damping", "x*mu")]
+    case = matrix_case(tmp_path, terms, 1.0, more=PARAMETER.format(0.0, 1.5))
+    found = st.stability_boundary(case, "x", "mu", x_range=(0.0, 1.5), y_range=(0.0, 1.0), lines=3)
+    assert not found.curves
+    assert {at.unstable_modes for at in found.counted} == {1}
+
+
 def wrong(seed: int, every: int = 1) -> tuple[bool, str]:
     """Whether all fits together by its own word, and where it does not although it says so; of the curves every so
     many-th piece is looked at."""

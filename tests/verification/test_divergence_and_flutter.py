@@ -108,6 +108,6 @@ def test_what_is_not_complete_has_an_exit_code_of_its_own(tmp_path: Path, monkey
     assert done.returncode == 3
     said = " ".join(done.stdout.split())
     assert "Not complete: 0 modes grow at μ = 0 and 1 at μ = 25" in said
-    assert "between μ = 14.0625 and 14.3229 the number of growing roots changes by -1, and by the onsets by +0" in said
+    assert "between μ = 14.0625 and 14.3229 the number of growing roots changes by -1, and by the onsets by 0" in said
     for words in (("reduce", "case.toml", "--onsets", "mu"), ("reduce", "case.toml", "--onsets", "mu", "--json")):
         assert stridor(*words, cwd=tmp_path).returncode == 3

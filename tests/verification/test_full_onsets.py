@@ -456,7 +456,7 @@ def test_an_onset_that_gets_lost_is_noticed(tmp_path: Path, monkeypatch: pytest.
     assert not found.complete
     assert found.completeness == (
         "Not complete: 0 modes grow at μ = 0 and 1 at μ = 1, found in the full problem, but between μ = 0.75 and 0.760417 "
-        "the number of growing roots changes by +2, and by the onsets by +0."
+        "the number of growing roots changes by +2, and by the onsets by 0."
     )
     assert st.onsets(model).completeness.startswith("Complete")
     document = st.onsets(model).to_json()

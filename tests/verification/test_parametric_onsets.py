@@ -9,9 +9,9 @@ import pytest
 import scipy.sparse as sp
 
 from stridor.errors import AnalysisError
-from stridor.modal.full import counted, onsets_along, parametric_onsets, search
-from stridor.modal.parametric import Parameter, ParametricProblem, Term, reduce
-from stridor.modal.parametric.factors import CONSTANT, Product
+from stridor.modal.full import counted, onsets_along, parametric_onsets, search, words
+from stridor.modal.parametric import Parameter, ParametricProblem, Term, all_freedoms, reduce
+from stridor.modal.parametric.factors import CONSTANT, Formula, Product
 from stridor.typing import Array, ComplexArray
 
 pytestmark = pytest.mark.verification
@@ -220,6 +220,44 @@ def test_counting_that_loses_an_onset_is_not_called_whole(monkeypatch: pytest.Mo
     assert len(fewer) < len(found)
     assert not fewer.complete
     assert fewer.sentence.startswith("Not complete")
+
+
+def test_growth_that_has_begun_by_less_than_rounding_is_confirmed_at_the_low_end():
+    """λ² − 1.5e-5 p λ + 1 = 0 from p = 1e-4 on grows all along, at the low end by less than rounding."""
+    made = [(np.eye(1), "mass", CONSTANT), (np.eye(1), "stiffness", CONSTANT), (np.array([[-1.5e-5]]), "damping", P)]
+    terms = tuple(Term(sp.csr_array(m), role, f, symmetric=True) for m, role, f in made)
+    whole = ParametricProblem(terms, (Parameter("p", 1e-4, 1.0, 0.5),))
+    found = onsets_along(all_freedoms(whole, 1.0), "p")
+    assert [(o.value, o.stabilising) for o in found] == [(1e-4, False)]
+    assert found[0].growth_slope == pytest.approx(0.75e-5)
+    assert found.complete
+
+
+@pytest.mark.parametrize("seed", [20, 21, 27])
+def test_two_equal_modes_that_part_slowly_at_the_low_end(seed: int):
+    """Circulation (p − 100)² N parts two equal modes: an onset at p = 100 whose growth is rounding for some values."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(3, 7))
+    part = 0.2 * rng.standard_normal((n, n))
+    mass = np.diag(rng.uniform(0.5, 2.0, n)) + part @ part.T
+    squares = rng.uniform(0.5, 3.0, n)
+    squares[1] = squares[0]
+    turn = np.linalg.cholesky(mass) @ np.linalg.qr(rng.standard_normal((n, n)))[0]
+    skew = 0.7 / np.sqrt(n) * rng.standard_normal((n, n))
+    factor = Formula("(p-100)**2", ("p",))
+    made = [(mass, "mass", CONSTANT), (turn @ np.diag(squares) @ turn.T, "stiffness", CONSTANT)]
+    made.append((skew - skew.T, "stiffness", factor))
+    terms = tuple(Term(sp.csr_array(m), role, f, symmetric=f is CONSTANT) for m, role, f in made)
+    whole = ParametricProblem(terms, (Parameter("p", 100.0, 103.0, 101.0),))
+    found = onsets_along(all_freedoms(whole, 0.6), "p")
+    assert found.complete
+    assert found[0].value == pytest.approx(100.0, abs=1e-6)
+
+
+def test_ends_of_an_interval_are_told_apart():
+    assert words._apart(100.0, 100.000390625) == ("100", "100.0004")
+    assert words._apart(0.25, 0.5) == ("0.25", "0.5")
+    assert (words._signed(0), words._signed(2), words._signed(-1)) == ("0", "+2", "-1")
 
 
 def test_what_is_left_out_unconfirmed_is_not_called_complete(monkeypatch: pytest.MonkeyPatch):

@@ -10,6 +10,7 @@ axis. What counts at a μ is every mode of the band there, wherever it began. It
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,9 +28,8 @@ from .quadratic import Quadratic, band_modes, is_stiff
 from .quadratic.polish import pairs
 from .quadratic.problem import times
 from .quadratic.reach import searched
-from .tolerances import SPLIT_RELATIVE, UNSTABLE_RELATIVE
+from .tolerances import AFFORDABLE, SPLIT_RELATIVE, UNSTABLE_RELATIVE
 
-AFFORDABLE = 60_000  # unknowns up to which the full problem is solved unasked
 BESIDE = 1e-3  # of the band: how much faster than that modes may decay that are looked at
 NEAR = 1e-3  # of the band: eigenvalues further apart are not the same mode
 SAME = 1e-6  # of |λ|: what two ways of solving leave of one eigenvalue
@@ -104,14 +104,34 @@ def _searched_for(
         asked = ("stands", rate, touching_at, options)
         return system.once(asked, lambda: is_stiff(problem.pencil(0.0).condensed(), rate, options.solver))
 
-    found = band_modes(whole, top / (2 * np.pi), above=-BESIDE * top, stands=stands, solver=options.solver, others=True)
+    return growing_in(
+        whole, mu, top, damped=problem.damped, stands=stands, freedoms=problem.size, solver=options.solver
+    )
+
+
+def growing_in(
+    whole: Quadratic,
+    mu: float,
+    top: float,
+    *,
+    damped: bool,
+    stands: Callable[[float], bool],
+    freedoms: int,
+    solver: str | None,
+) -> Growing:
+    """Every mode of a problem's matrices that grows with a frequency up to top [1/s], called by ``mu``. stands: as of
+    `band_modes`; freedoms: of the vectors, without what multipliers there are.
+
+    Raises AnalysisError where the search does not settle.
+    """
+    found = band_modes(whole, top / (2 * np.pi), above=-BESIDE * top, stands=stands, solver=solver, others=True)
     size = np.abs(found.values)
-    rounding = UNSTABLE_RELATIVE if problem.damped else SPLIT_RELATIVE
-    limit = rest_limit([whole], top, options.solver) if np.any(size <= SLOW * top) else 0.0
+    rounding = UNSTABLE_RELATIVE if damped else SPLIT_RELATIVE
+    limit = rest_limit([whole], top, solver) if np.any(size <= SLOW * top) else 0.0
     grows = (found.values.real > rounding * size) & (size > limit)
     # Slow modes of stiff meshes are found to fewer digits: what one more correction would change is no growth.
     grows &= ~(found.values.real <= SURE * _correction(whole, found.values, found.right))
-    right = found.right[: problem.size, grows]
+    right = found.right[:freedoms, grows]
     return Growing(
         mu,
         found.values[grows],
@@ -123,7 +143,7 @@ def _searched_for(
         top,
         fastest=found.completeness.searched.re_max,
         still=limit,
-        shapes=np.hstack([found.right, *([] if found.beside is None else [found.beside])])[: problem.size],
+        shapes=np.hstack([found.right, *([] if found.beside is None else [found.beside])])[:freedoms],
     )
 
 
@@ -178,4 +198,9 @@ def doubt(completeness: str) -> str:
 
 def too_large(system: System) -> str:
     """Why what grows is not sought unasked."""
-    return f"with {system.size} freedoms what grows is not sought anew in the full problem (up to {AFFORDABLE} it is)"
+    return too_many(system.size)
+
+
+def too_many(freedoms: int) -> str:
+    """The same of so many freedoms."""
+    return f"with {freedoms} freedoms what grows is not sought anew in the full problem (up to {AFFORDABLE} it is)"

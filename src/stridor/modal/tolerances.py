@@ -13,3 +13,4 @@ AT_REST = 1e-5
 BELIEVED = 1e-8
 # Backward error of a pair that Newton's method settled on in the full problem: what it should reach is 1e-15.
 CONFIRMED = 1e-10
+AFFORDABLE = 60_000  # unknowns up to which the full problem is solved unasked

@@ -21,7 +21,7 @@ from ..modal.parametric import ReducedModel
 from ..threads import one_thread
 from ..typing import Array, IntArray
 from .asked import require_friction, require_range
-from .boundary_again import position_error, solved_again
+from .boundary_again import corners_in_full, position_error, solved_again
 from .boundary_counts import CountedAt
 from .boundary_problem import BoundaryAsked, Method, plane_of, solved_problem
 from .boundary_result import Boundary, BoundaryCurve
@@ -80,12 +80,13 @@ def stability_boundary(
     plane, notes = plane_of(solved, ends)
     found = boundaries(plane, tolerance, lines, progress)
     again, failed = solved_again(found, solved.problem, solved.vectors, options_of(case).solver)
+    held = corners_in_full(found, solved.model, options_of(case).solver)
     curves = tuple(_curve(found, curve, solved.model) for curve in found.curves)
     result_notes, warnings = told(found, asked.paths, solved, again, failed, tolerance)
     elsewhere = bool(getattr(solved.problem, "elsewhere", ()))
     return Boundary(
-        x, y, *ends, top, curves, *_lines(found), _counted(found), found.agree and not elsewhere,
-        sentence(found, asked.paths, elsewhere=elsewhere),
+        x, y, *ends, top, curves, *_lines(found), _counted(found), found.agree and held.holds and not elsewhere,
+        sentence(found, asked.paths, held, elsewhere=elsewhere),
         "full" if solved.model is None else "reduced", len(plane.sizes), plane.solves, plane.steps,
         0 if solved.model is None else solved.model.solves, again, (*solved.notes, *notes, *result_notes),
         (*solved.problem.idle_words, *warnings, *(work.one_for_all if MU in (x, y) else ())),

@@ -8,6 +8,7 @@ from ..errors import AnalysisError
 from ..modal.boundary import Found, Plane, StabilityCurve
 from ..modal.boundary.spot import CurvePoint
 from ..modal.dense_problem import combined
+from ..modal.full.held_in_full import HeldInFull, Listed, held_in_full
 from ..modal.full.line import ParameterLine
 from ..modal.full.passages import quiet
 from ..modal.newton import Root, crossing, meeting, standstill
@@ -54,6 +55,23 @@ def solved_again(
         x, y = (plane.low + (plane.high - plane.low) * spot.p).tolist()
         done.append(SolvedAgain(number, x, y, off, residual))
     return tuple(done), failed
+
+
+def corners_in_full(found: Found, model: ReducedModel | None, solver: str | None) -> HeldInFull:
+    """What the full problem says of the modes that grow on a reduced model at the corners of the rectangle; where it
+    differs is added to what is wrong."""
+    plane = found.plane
+    if model is None:
+        return HeldInFull()
+    corners = [np.array([x, y]) for x in (0.0, 1.0) for y in (0.0, 1.0)]
+    try:
+        values = [plane.modes(p).values for p in corners]
+    except AnalysisError as error:
+        return HeldInFull(why=f"the model has no modes at a corner: {error}")
+    listed = [Listed(plane.values(p), lam, plane.grows(lam)) for p, lam in zip(corners, values, strict=True)]
+    held = held_in_full(model, listed, damped=not plane.reversible, solver=solver)
+    found.wrong += [(words, p) for words, p in zip(held.amiss, corners, strict=False) if words]
+    return held
 
 
 def _chosen(curves: list[StabilityCurve]) -> list[tuple[int, int]]:

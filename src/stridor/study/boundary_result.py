@@ -113,8 +113,9 @@ class Boundary(Tabular):
 
     lines_x, lines_y: values of x and of y on whose lines onsets were sought; a closed curve that cuts none of them is
     found only where ``counted`` points betray it. agree: whether as many onsets lie on every line as curves cross it,
-    as many modes grow at every counted point as the curves say, every curve was followed to its end, and the same nodes
-    touch wherever that was looked at; sentence: that in words, and what it leaves open.
+    as many modes grow at every counted point as the curves say, every curve was followed to its end, the full problem
+    has the growing modes of a reduced model at the corners, and the same nodes touch wherever that was looked at;
+    sentence: that in words, and what it leaves open.
 
     solves: eigenvalue problems, steps: factorisations of Newton's method, both of the ``size`` unknowns of the problem
     that was solved (method "full": the whole one; "reduced": a reduced model within ``bound`` of it by its own

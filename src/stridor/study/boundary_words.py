@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..modal.boundary import Found
+from ..modal.full.held_in_full import HeldInFull
 from ..modal.full.parametric_onsets import ELSEWHERE
+from ..modal.growing import UNCHECKED
 from ..notebook import counted
 from .boundary_problem import PlaneProblem
 from .boundary_result import SolvedAgain
@@ -16,17 +18,20 @@ MOST_TOLD = 3
 LEFT_OPEN = "closed curves that lie between the lines can be missing"
 
 
-def sentence(found: Found, paths: tuple[str, str], *, elsewhere: bool = False) -> str:
-    """Whether lines, curves and counts fit together, and what that does not say. elsewhere: whether other nodes touch
-    at some values than those that are held."""
+def sentence(found: Found, paths: tuple[str, str], held: HeldInFull, *, elsewhere: bool = False) -> str:
+    """Whether lines, curves and counts fit together, and what that does not say. held: what the full problem says of a
+    reduced model at the corners; elsewhere: whether other nodes touch at some values than those that are held."""
     if elsewhere:
-        return f"Not complete: {ELSEWHERE}. With the nodes that are held: {sentence(found, paths)}"
+        return f"Not complete: {ELSEWHERE}. With the nodes that are held: {sentence(found, paths, held)}"
+    if held.why:
+        return f"{UNCHECKED}: {held.why}. On the model: {sentence(found, paths, HeldInFull())}"
     on = " and ".join(f"{sum(line.axis == axis for line in found.lines)} of {path}" for axis, path in enumerate(paths))
     where = f"Onsets were sought on lines at {on} (at most {_mesh(found)} of a range apart) and modes counted at "
     where += counted(len(found.looked), "point")
     if found.agree:
         fit = "every onset lies on a curve, every curve that crosses a line does so at an onset, and counts are those "
-        return f"{where}: {fit}that the curves say. Not excluded: {LEFT_OPEN}."
+        full = "At the corners the full problem has the same growing modes, sought anew there. " if held.amiss else ""
+        return f"{where}: {fit}that the curves say. {full}Not excluded: {LEFT_OPEN}."
     wrong = _wrong(found, paths)
     listed = "; ".join(wrong[:MOST_TOLD]) + (f"; {len(wrong) - MOST_TOLD} more" if len(wrong) > MOST_TOLD else "")
     return f"{where}. Not all of that fits together: {listed}. More lines may help, or smaller ranges."

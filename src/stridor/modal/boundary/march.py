@@ -219,21 +219,24 @@ def _tried(plane: Plane, way: _MarchState) -> CurvePoint | None:
     """A step's point, on the edge of the rectangle where the step leads across that; None where there is none."""
     ahead = _rotated(way.heading, 0.5 * way.bend * way.step)
     target = way.spot.p + way.step * ahead
-    if not _inside(target):
+    if not inside(target):
         return _at_edge(plane, way, target)
     normal = _rotated(way.heading, way.bend * way.step + 0.5 * np.pi)
     new = _corrected(plane, way, target, normal, BESIDE * way.step)
-    return _at_edge(plane, way, new.p) if new is not None and not _inside(new.p) else new
+    return _at_edge(plane, way, new.p) if new is not None and not inside(new.p) else new
 
 
 def _at_edge(plane: Plane, way: _MarchState, target: Array) -> CurvePoint | None:
-    """The point on the edge that the straight line from the last one to a target crosses, solved along the edge."""
+    """The point on the edge that the straight line from the last one to a target crosses, solved along the edge; None
+    where it crosses none, or no point is found there."""
     last, step = way.spot.p, target - way.spot.p
     shares = [
         (float((edge - last[axis]) / step[axis]), axis, edge)
         for axis in (0, 1) for edge in (0.0, 1.0)
         if step[axis] and (target[axis] - edge) * (edge - 0.5) > 0
     ]  # fmt: skip
+    if not shares:
+        return None
     share, axis, edge = min(shares)
     guess = last + share * step
     guess[axis] = edge
@@ -377,7 +380,8 @@ def _leaving(way: _MarchState) -> bool:
     )
 
 
-def _inside(p: Array) -> bool:
+def inside(p: Array) -> bool:
+    """Whether a point (2,) is in the rectangle, its edges included."""
     return bool(np.all(p >= -INSIDE) and np.all(p <= 1 + INSIDE))
 
 

@@ -95,11 +95,14 @@ class Plane:
 
     def count(self, found: DenseModes) -> Count:
         """How much of this grows."""
-        lam = found.values
-        rounding = SPLIT_RELATIVE if self.reversible else UNSTABLE_RELATIVE
-        grows = lam[(lam.real > told_growth(lam, rounding, self.top)) & self.moving(lam)]
+        grows = found.values[self.grows(found.values)]
         near = bool(np.any(np.abs(grows) > NEAR_TOP * self.top))
         return Count(len(grows), growing_roots(grows), not near)
+
+    def grows(self, values: ComplexArray) -> BoolArray:
+        """Which eigenvalues (k,) at some point grow beyond rounding."""
+        rounding = SPLIT_RELATIVE if self.reversible else UNSTABLE_RELATIVE
+        return (values.real > told_growth(values, rounding, self.top)) & self.moving(values)
 
     def moving(self, values: ComplexArray) -> BoolArray:
         """Which eigenvalues (k,) at some point are no motions as a whole."""

@@ -22,7 +22,7 @@ from ..onset import Onset
 from ..tolerances import UNSTABLE_RELATIVE
 from .climb import ModesAtPoint, climb, tops
 from .curve import Crossing, Drawn, StabilityCurve, carried, crossings
-from .march import apart, joined, traced, without_points
+from .march import apart, inside, joined, traced, without_points
 from .passing import FINEST, refined
 from .plane import Count, Plane
 from .spot import CurvePoint, Kind, point_on
@@ -206,7 +206,9 @@ class _CurveSearch:
         omega = 2 * np.pi * onset.frequency_hz
         chord = self.plane.chord(p, np.eye(2)[1 - line.axis], (-REACH, REACH))
         right, left = chord.null_vectors(1j * omega, 0.0)
-        return point_on(self.plane, kind, chord, omega, right.astype(complex), left.astype(complex))
+        spot = point_on(self.plane, kind, chord, omega, right.astype(complex), left.astype(complex))
+        # Growth that opens at the end of a line may have begun before it, by less than rounding.
+        return spot if spot is not None and inside(spot.p) else None
 
     # -- counts -------------------------------------------------------------------------------------------------------
     def _look(self, p: Array) -> None:

@@ -320,7 +320,8 @@ def _model(family: Family, frequency: float) -> ReducedModel:
         raise AnalysisError("some freedoms have neither stiffness nor mass of their own, as multipliers have it")
     if not _positive(middle.mass):
         raise AnalysisError("the mass has negative entries on its diagonal")
-    return reduce(problem, frequency / (2 * np.pi), solver=family.options.solver)
+    # What grows at both ends is counted in the full problem by whoever follows branches on it.
+    return reduce(problem, frequency / (2 * np.pi), solver=family.options.solver, sure=False)
 
 
 def _positive(mass: Sparse) -> bool:

@@ -21,7 +21,7 @@ from ..histories import within_rounding
 from ..newton import CONVERGED, Root, crossing, meeting, standstill
 from ..onset import Onset
 from ..quadratic.polish import pairs
-from ..tolerances import UNSTABLE_RELATIVE
+from ..tolerances import SPLIT_RELATIVE, UNSTABLE_RELATIVE
 from .basis import Along
 from .family import Family
 from .foretold import SLOWEST, changes_within
@@ -97,11 +97,15 @@ class Counted:
         return lacks
 
     def _unseen(self, onset: Onset) -> float:
-        """How far from an onset growth with its slope may still be too slow to count as growth."""
+        """How far from an onset growth with its slope, or as its square root, may still be too slow to count as growth:
+        of two modes that are one at the low end and part as a higher power, far further than others."""
+        width = self.grid[-1][0] - self.grid[0][0]
+        if not onset.growth_slope and onset.square_root_coefficient:
+            split = UNSURE * SPLIT_RELATIVE * 2 * np.pi * onset.frequency_hz / onset.square_root_coefficient
+            return float(min(split**2, CLOSEST * width))
         if not onset.growth_slope:
             return 0.0
         slowest = UNSTABLE_RELATIVE * 2 * np.pi * onset.frequency_hz or self.rest
-        width = self.grid[-1][0] - self.grid[0][0]
         return float(min(UNSURE * slowest / abs(onset.growth_slope), CLOSEST * width))
 
 

@@ -20,15 +20,19 @@ from ...tabular import Rows, Tabular, dataset
 from ...threads import one_thread
 from ...typing import ComplexArray
 from ..dense_problem import combined
+from ..growing import UNCHECKED
 from ..newton import Root, crossing, meeting, standstill
 from ..onset import Onset, from_above
 from ..options import Options
 from ..parametric import ReducedModel
 from ..parametric.contacts_steady import FRICTION, STIFFNESS
 from ..parametric.problem import NOT_KNOWN
+from ..quadratic import RegionModes
 from ..tables import ONSET
 from .branches import ends_of
 from .counted import ends as turns
+from .growth import unstable
+from .held_in_full import HeldInFull, Listed, held_in_full
 from .line import OnTerms, ParameterLine, of_model
 from .opening import told
 from .passages import quiet
@@ -239,7 +243,8 @@ def onsets_along(
     their own values), in ascending order.
 
     confirm solves each again in the full problem, two or three factorisations for one; what that does not confirm is
-    left out and named in the sentence. Raises CaseError for unknown parameters.
+    left out and named in the sentence. It also seeks what grows at both ends anew there: where that is not what grows
+    on the model, or was not found, the onsets are not complete. Raises CaseError for unknown parameters.
     """
     names = [p.name for p in model.problem.parameters]
     if parameter not in names:
@@ -256,11 +261,16 @@ def onsets_along(
     onsets = [found for _, found in tried if found is not None]
     where = "" if model.keeps_all else "in the reduced model"
     left_out = len(onsets) < len(tried)
-    said = sentence(line, answer, ends, top, parameter, line.value, where, left_out)
-    complete = answer.vouched
+    held = _held(model, line, ends, top, solver) if confirm else None
+    differs = held is not None and not held.holds
+    lead = "With these" if left_out else "On the model" if differs else ""
+    said = sentence(line, answer, ends, top, parameter, line.value, where, lead)
+    complete = answer.vouched and not differs
     if left_out:
         lost = ", ".join(f"{line.value(o.mu):.6g} ({o.frequency_hz:.6g} Hz)" for o, found in tried if found is None)
         complete, said = False, f"Not confirmed in the full problem and left out: {parameter} = {lost}. {said}"
+    if held is not None and where:
+        said = _with_full(said, held, parameter, line)
     # Of a mode with other nodes in contact nothing was sought.
     others = unlike_along(model, parameter, point)
     if others:
@@ -269,6 +279,28 @@ def onsets_along(
         complete, said = False, f"Not complete: {ELSEWHERE}. {said}"
     listed = sorted(onsets, key=lambda o: o.value)
     return ParametricOnsets.of(listed, model, parameter, complete=complete, sentence=said)
+
+
+def _held(
+    model: ReducedModel, line: ParameterLine, ends: tuple[RegionModes, RegionModes], top: float, solver: str | None
+) -> HeldInFull:
+    """What the full problem says of what grows on the model at both ends of a line."""
+    listed = [
+        Listed(line.point(s), end.values, unstable(line, end.values, top))
+        for s, end in zip((0.0, 1.0), ends, strict=True)
+    ]
+    return held_in_full(model, listed, damped=not line.reversible, solver=solver)
+
+
+def _with_full(said: str, held: HeldInFull, name: str, line: ParameterLine) -> str:
+    """A sentence with what the full problem says of both ends."""
+    if held.holds:
+        return f"{said} In the full problem the same modes grow at both ends, sought anew there."
+    if held.why:
+        return f"{UNCHECKED}: {held.why}. {said}"
+    places = zip(held.amiss, (0.0, 1.0), strict=True)
+    told = "; ".join(f"{words} at {name} = {line.value(s):g}" for words, s in places if words)
+    return f"Not complete: {told}. {said}"
 
 
 def _of(line: ParameterLine, onset: Onset, root: Root | None) -> ParametricOnset:
@@ -311,10 +343,12 @@ def _roots(
     if onset.kind == "divergence":
         yield standstill(full, s, x, y, between)
         return
-    if onset.growth_slope == 0.0:
+    if onset.growth_slope == 0.0 or (s == full.low and not onset.stabilising):
+        # Growth that opens at the low end, or has begun before it by less than rounding, is no root in the range.
         opened = told(full, lam, x, y)
         yield None if opened is None else opened.root
-        return
+        if onset.growth_slope == 0.0:
+            return
     if not full.reversible:
         yield crossing(full, s, lam, x, y, between)
     yield meeting(full, s, lam, x, y, between)

@@ -23,13 +23,13 @@ BARELY = 1e-4  # of the highest frequency: what is no faster may be the one that
 
 def sentence(
     family: Family, answer: Answer, ends: tuple[RegionModes, RegionModes], top: float, name: str,
-    value: Callable[[float], float], where: str = "", left_out: bool = False,
+    value: Callable[[float], float], where: str = "", lead: str = "",
 ) -> str:  # fmt: skip
     """What speaks for these onsets being all, or where they are not. name: of the parameter, value(μ) what it is there;
-    top [1/s]: the end of the band; where: what was searched, if not the full problem; left_out: whether some of them
-    are not listed, so that nothing listed is complete."""
+    top [1/s]: the end of the band; where: what was searched, if not the full problem; lead: what is said in place of
+    Complete, where something else keeps the list from being that."""
     if answer.slow:
-        faster = sentence(family, replace(answer, slow=0.0), ends, top, name, value, where, left_out)
+        faster = sentence(family, replace(answer, slow=0.0), ends, top, name, value, where, lead)
         return f"Not complete: there are {slow_words(answer.slow)}. Of faster ones: {faster}"
     first, last = (int(np.count_nonzero(unstable(family, end.values, top))) for end in ends)
     low, high = (f"{value(mu):g}" for mu in _between(family, answer))
@@ -42,7 +42,7 @@ def sentence(
         return f"Not complete: {numbers}, but {_lacking(answer, name, value)}.{passing}"
     if answer.way is None:
         assert answer.seen is not None, "what else would have led to it"
-        as_many = "With these, as many" if left_out else "As many"
+        as_many = f"{lead}, as many" if lead else "As many"
         how = f"{as_many} roots grow at each of {len(answer.seen.grid)} values of {name} as the onsets say"
         numbers += _pairs(family, answer, ends, top)
         why = f": {_named(answer.why, name, value)}" if answer.why else ""
@@ -67,8 +67,7 @@ def sentence(
     whole = where or "in the full problem"
     anew = f"All modes up to {top / (2 * np.pi):g} Hz at both ends were found anew {whole} ({counted})"
     between = _between_steps(answer, name)
-    lead = "With these" if left_out else "Complete as far as both ends tell"
-    return f"{lead}: {numbers}, {said}.{passing} {told}. {anew}. {between}"
+    return f"{lead or 'Complete as far as both ends tell'}: {numbers}, {said}.{passing} {told}. {anew}. {between}"
 
 
 def _named(why: str, name: str, value: Callable[[float], float]) -> str:
@@ -117,12 +116,24 @@ def _lacking(answer: Answer, name: str, value: Callable[[float], float]) -> str:
     if not answer.lacks:
         return "what was counted there is not the same"
     differences = [
-        f"between {name} = {value(lack.low):.6g} and {value(lack.high):.6g} the number of growing roots changes by "
-        f"{lack.seen:+d}, and by the onsets by {lack.said:+d}"
+        f"between {name} = {' and '.join(_apart(value(lack.low), value(lack.high)))} the number of growing roots "
+        f"changes by {_signed(lack.seen)}, and by the onsets by {_signed(lack.said)}"
         for lack in answer.lacks[:MOST]
     ]
     more = len(answer.lacks) - len(differences)
     return "; ".join([*differences, *([f"and in {more} more places"] if more else [])])
+
+
+def _apart(low: float, high: float) -> tuple[str, str]:
+    """Both ends of an interval with as many digits, six at least, as tell them apart."""
+    for digits in range(6, 17):
+        if (told := (f"{low:.{digits}g}", f"{high:.{digits}g}"))[0] != told[1]:
+            return told
+    return f"{low!r}", f"{high!r}"
+
+
+def _signed(number: int) -> str:
+    return f"{number:+d}" if number else "0"
 
 
 def _passing(passing: tuple[Passing, ...], name: str, value: Callable[[float], float]) -> str:

@@ -27,8 +27,10 @@ from .problem import ParametricProblem
 from .states import spanned
 
 SEED = 20061
+GUARD = 1.5  # modes up to this much above the band take part from the start
 MARGIN = 1.03  # modes up to this much above the band are made exact
 WEAKEST = 3e-2  # of the strongest direction of a block of residuals: what waits for another point
+ALONG = 1e-6  # of a unit vector: what of modes of the full problem is on the basis already
 LEFT_OUT = 1e-2  # of a unit vector: new directions smaller than this are not worth a column
 PASSED = 0.3  # of the bound: what residuals at a point may say
 MEASURED = 0.2  # of the bound: what an error may be where it is measured
@@ -113,6 +115,19 @@ class Greedy:
             "the reduced model does not settle over the box; ask for a smaller box, a lower frequency or a larger bound"
         )
 
+    def known(self, point: Point) -> ComplexArray:
+        """The eigenvalues (k,) at a point as it passed, perhaps on the basis as it was then."""
+        found = next((modes for other, modes in reversed(self.passed) if other == point), None)
+        return self.values(point) if found is None else found.values
+
+    def values(self, point: Point) -> ComplexArray:
+        """The eigenvalues (k,) at a point on the basis as it is."""
+        return self._solved(self._matrices(point)).values
+
+    def add(self, shapes: Array) -> int:
+        """Take vectors (n, k) into the basis; returns how many directions that made."""
+        return self.basis.add(shapes, ALONG)
+
     def cut(self) -> ReducedModel:
         """The basis as small as errors and estimates allow."""
         sides = len(self.problem.parameters)
@@ -169,6 +184,8 @@ class Greedy:
         cut = [replace(m, right=turn.T @ m.right, left=turn.T @ m.left) for m in found]
         matrices = assembled(model.projected, problem.factors(problem.reference), problem.powers)
         directions = spanned(cut, matrices, self.frequency)
+        # Where the band has no mode, states that never saw the place must not have one either.
+        places = [*watched, *(point for point, modes in self.passed if not len(modes.values))]
         for share in STATES:
             states = directions.but(share)
             if states.count > WORTH * model.size:
@@ -177,7 +194,7 @@ class Greedy:
             constant = _constant(tried, measured, exact)
             if constant is not None:
                 tried = replace(tried, constant=constant)
-                if all(np.all(tried.modes(point).error <= SPARED * self.bound) for point in watched):
+                if all(np.all(tried.modes(point).error <= SPARED * self.bound) for point in places):
                     return tried, constant
         return model, model.constant
 

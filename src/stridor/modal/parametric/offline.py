@@ -2,7 +2,8 @@
 
 One factorisation serves all: A₀ = K_s + s M_s, the symmetric part of the problem at the middle of the box. Vectors are
 taken in as A₀⁻¹ times what friction, contact stiffness and damping leave unbalanced, from the right and from the left,
-first for the modes themselves, then at points of the box (`greedy`).
+first for the modes themselves, then at points of the box (`greedy`). Modes that these never lead to are asked of the
+full problem (`asked_in_full`).
 """
 
 from __future__ import annotations
@@ -20,14 +21,14 @@ from ...threads import one_thread
 from ...typing import Array, IntArray, Sparse
 from ..quadratic.reach import reaches, searched_in
 from ..shift_inverted import undamped_pairs
+from .asked_in_full import complete
 from .basis import Indefinite, ReducedBasis
 from .dense import assembled
-from .greedy import MARGIN, SEED, Greedy, ReductionCost, grid_points
+from .greedy import GUARD, MARGIN, SEED, Greedy, ReductionCost, grid_points
 from .model import ReducedModel
 from .problem import ParametricProblem
 
 BLOCK = 24
-GUARD = 1.5  # real modes up to this much above the band take part
 CONVERGED = 1e-2  # of λ²: real modes only start the basis
 FAINT = 1e-2  # of a unit vector: first answers smaller than this are left out
 SHIFT = 0.3  # √s over the band
@@ -43,12 +44,14 @@ def reduce(
     bound: float = 1e-8,
     counts: tuple[int, ...] | None = None,
     solver: str | None = None,
+    sure: bool = True,
 ) -> ReducedModel:
     """A reduced model for all modes up to ``max_frequency_hz`` and all parameters in the box.
 
     bound: relative error of the eigenvalues. counts: candidate points along each parameter (by default 5 of a single
-    one, 3 of two or three, 2 of more); points in no relation to the grid have to pass as well. Raises CaseError for a
-    frequency or a bound that is none, AnalysisError where the bound is not reached.
+    one, 3 of two or three, 2 of more); points in no relation to the grid have to pass as well. sure: ask the full
+    problem for modes that the model lacks (`asked_in_full`) even where it has some. Raises CaseError for a frequency or
+    a bound that is none, AnalysisError where the bound is not reached.
     """
     if not (np.isfinite(max_frequency_hz) and max_frequency_hz > 0):
         raise CaseError("max_frequency_hz", max_frequency_hz, "a positive frequency in Hz")
@@ -78,7 +81,11 @@ def reduce(
                 _first_answers(basis, factor, frequency, work)
                 work.lap("first answers")
                 growing = Greedy(basis, operator, factor, frequency, bound, work)
-                growing.enrich(grid_points(problem, counts))
+                grid = grid_points(problem, counts)
+                growing.enrich(grid)
+                work.lap("enrichment")
+                complete(growing, grid, sure=sure, solver=solver)
+                work.lap("full problem")
                 return replace(growing.cut(), frequency=asked)
             except Indefinite:
                 continue
