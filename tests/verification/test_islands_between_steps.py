@@ -166,3 +166,24 @@ def test_damped_modes_that_pass_each_other_grow_in_between(seeds: range, source:
         assert said == pytest.approx(expected, abs=1e-3 * width + 1e-9), f"seed {seed}, about {width:.1e} wide"
         assert [o.stabilising for o in found] == [False, True]
     assert whole >= 0.9 * len(seeds)
+
+
+@pytest.mark.parametrize("weak", [1e-8, 1e-9, 1e-10, 1e-11, 1e-12])
+@pytest.mark.parametrize("decay", [0.3, 0.9])
+def test_one_beside_modes_that_are_one(weak: float, decay: float) -> None:
+    """Two more contacts see modes of one frequency, which the receptance does not tell apart: the full problem is
+    followed, as a count at some values misses an island."""
+    place, turn = 0.45, 0.8
+    squares, slip = np.array([4.0, 5.0 - place * turn, 9.0, 9.0, 9.0]), {"slip": 1.0, "stiffness": 1.0}
+    law = {"friction": {"law": "coulomb", "coefficient": 0.3}}
+    rows = {"c": ([1.0, weak, 0.0, 0.0, 0.0], [turn, 1.0, 0.0, 0.0, 0.0])}
+    rows |= {f"d{k}": (np.eye(5)[2 + k], 0.1 * np.eye(5)[2 + k]) for k in range(2)}
+    contacts = {name: {"normal": n, "tangent": t, **slip, **law} for name, (n, t) in rows.items()}
+    root = np.sqrt(weak * (1 - place * turn) * place)
+    damping = decay * root / (2 * np.sqrt(squares[1])) * np.eye(5)
+    system = System.from_matrices(np.eye(5), damping, np.diag(squares), contacts=contacts)
+    expected = ends_of_growth(system, place, 2 * root / turn)
+    found = onsets_of_band(system, (0.0, 1.0), 1.0)
+    assert found.source == "full"
+    assert found.complete, found.completeness
+    assert [o.mu for o in found] == pytest.approx(expected, abs=1e-3 * root + 2e-9)

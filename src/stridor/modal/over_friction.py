@@ -7,6 +7,7 @@ modes at a μ do not depend on which others were asked for, and an onset is solv
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import asdict, replace
 from functools import partial
 from typing import Literal
@@ -23,6 +24,7 @@ from .checked_onsets import checked_onsets, sought_at_end
 from .complex_modes import complex_modes
 from .from_above import WIDER, Returning, with_origins
 from .full import full_onsets
+from .full.basis import DENSE as SMALL
 from .full.basis import WHOLE
 from .growing import UNCHECKED, affordable, growing_modes
 from .joined import TouchingChange, joined_modes, joined_onsets, rows_of
@@ -236,7 +238,13 @@ def _solved_onsets(
         except FollowingError as error:
             if held.size > WHOLE or options.source is not None:
                 raise
-            return unfollowed(held, between, str(error).partition(";")[0])
+            why = str(error).partition(";")[0]
+            if held.size <= SMALL:  # followed at once: a count may miss what begins and ends between two values
+                with suppress(AnalysisError):
+                    found = unfollowed(held, between, None)
+                    if found.complete:
+                        return found
+            return unfollowed(held, between, why)
         if not found.completeness:
             if not check:
                 return found

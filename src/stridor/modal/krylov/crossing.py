@@ -15,7 +15,8 @@ from .follow import BranchState, Follower
 from .passages import Passage
 
 NEAR_AXIS = 1e-6  # of the band: below it a frequency is zero
-JUMP = 0.01  # of the growth at both ends: what is left of it where it jumps over zero
+ROUNDING = 1e-9  # of |λ|: growth at what is told as its zero
+BESIDE = (1e-12, 1e-8)  # of μ: at which distances a rate that jumps over zero changes by as much
 
 
 @dataclass(frozen=True)
@@ -101,12 +102,21 @@ def _slow_crossing(reduced: DenseProblem, passage: Passage, start: BranchState) 
         return None
     state = at(mu)
     lam = complex(state.values[passage.branch])
-    # Where two modes exchange their names the growth of either jumps, and nothing begins or ends. Beside a motion
-    # as a whole what passes zero is known to the root of rounding alone.
-    least = JUMP * min(abs(rate(passage.low)), abs(rate(passage.high)))
-    if abs(lam.real) > least and abs(lam) > AT_REST * reduced.frequency:
+    # Beside a motion as a whole what passes zero is known to the root of rounding alone.
+    if abs(lam) > AT_REST * reduced.frequency and _jumps(rate, mu, passage, ROUNDING * abs(lam)):
         return None
     return mu, 1j * lam.imag, float(state.tangents[passage.branch].real)
+
+
+def _jumps(rate: Callable[[float], float], mu: float, passage: Passage, rounding: float) -> bool:
+    """Whether a growth rate jumps at its zero, as that of a branch that exchanges its name with another: nothing begins
+    or ends there. What is continuous changes less over less, beside a double root as well."""
+    scale = max(passage.high, 1e-3)
+    near, far = (
+        abs(rate(min(mu + part * scale, passage.high)) - rate(max(mu - part * scale, passage.low)))
+        for part in BESIDE
+    )
+    return near > max(0.5 * far, rounding)
 
 
 def _by_growth(reduced: DenseProblem, passage: Passage) -> tuple[float, complex, float] | None:
@@ -134,7 +144,7 @@ def _by_growth(reduced: DenseProblem, passage: Passage) -> tuple[float, complex,
         return None
     found, index = fastest(mu)
     lam, slope = complex(found.values[index]), float(found.tangents[index].real)
-    if abs(lam.real) > 1e-9 * abs(lam) or (slope < 0) != passage.stabilising:
+    if abs(lam.real) > ROUNDING * abs(lam) or (slope < 0) != passage.stabilising:
         return None
     return mu, 1j * lam.imag, slope
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...typing import Array, ComplexArray, IntArray
+from ...typing import Array, BoolArray, ComplexArray, IntArray
 from ..dense_problem import Eigenpairs, OverNumber
 from ..tolerances import UNSTABLE_RELATIVE
 from .follow import BranchState, halves
@@ -68,14 +68,25 @@ def _candidates(old: BranchState, new: BranchState) -> list[tuple[int, int]]:
     if not len(i):
         return []
     h, k = ((v[i] - v[j]) / 2 for v in (x, y))
-    square = _cubic(h * h, k * k, h * (slopes[0][i] - slopes[0][j]), k * (slopes[1][i] - slopes[1][j]), LOOKED[:, None])
+    turn, turn_to = h * (slopes[0][i] - slopes[0][j]), k * (slopes[1][i] - slopes[1][j])
+    square = _cubic(h * h, k * k, turn, turn_to, LOOKED[:, None])
     mean, mean_to, rate, rate_to = ((v[i] + v[j]) / 2 for v in (x, y, *slopes))
     grows = _cubic(mean, mean_to, rate, rate_to, LOOKED[:, None]).real + np.abs(np.sqrt(square).real) > 0.0
     near = np.abs(square).min(axis=0) < NEARER * np.minimum(np.abs(h), np.abs(k)) ** 2
+    # Where they pass each other right beside an end its own slope says so.
+    near |= _comes_near(h * h, turn) | _comes_near(k * k, -turn_to)
     # What is far apart all along is no pair, whatever a cubic makes of the slopes of others.
     chosen = np.flatnonzero(near | (grows[1:-1].any(axis=0) & (np.abs(square).min(axis=0) < np.abs(h) ** 2)))
     order = np.argsort(np.abs(square).min(axis=0)[chosen], kind="stable")
     return [(int(i[k]), int(j[k])) for k in chosen[order]]
+
+
+def _comes_near(square: ComplexArray, change: ComplexArray) -> BoolArray:
+    """Whether squared half differences (k,) come within NEARER of zero in a step that changes them so, if straight."""
+    with np.errstate(all="ignore"):
+        part = -np.real(square * change.conj()) / np.abs(change) ** 2
+        near: BoolArray = (part > 0.0) & (part < 1.0) & (np.abs(square + part * change) < NEARER * np.abs(square))
+    return near
 
 
 def _growing_between(source: OverNumber, low: _Pair, high: _Pair) -> tuple[float, _Pair, _Pair] | None:
