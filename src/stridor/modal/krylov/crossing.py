@@ -16,7 +16,7 @@ from .passages import Passage
 
 NEAR_AXIS = 1e-6  # of the band: below it a frequency is zero
 ROUNDING = 1e-9  # of |λ|: growth at what is told as its zero
-BESIDE = (1e-12, 1e-8)  # of μ: at which distances a rate that jumps over zero changes by as much
+ABOUT = 4.0  # times the way of a mode over a passage: where others count with it
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,9 @@ def crossing(reduced: DenseProblem, passage: Passage) -> Solved | None:
     found = _quick_crossing(reduced, passage)
     if found is None:
         start = _again(reduced, passage)
-        found = None if start is None else _slow_crossing(reduced, passage, start)
-    if found is None:
-        found = _by_growth(reduced, passage)
+        found, sure = (None, False) if start is None else _slow_crossing(reduced, passage, start)
+        # Where two modes exchange their names the growth of either jumps over zero: that of both together tells more.
+        found = found if sure else _by_growth(reduced, passage) or found
     if found is None:
         return None
     mu, lam, slope = found
@@ -88,8 +88,10 @@ def _quick_crossing(reduced: DenseProblem, passage: Passage) -> tuple[float, com
     return root.mu, root.lam, root.slope
 
 
-def _slow_crossing(reduced: DenseProblem, passage: Passage, start: BranchState) -> tuple[float, complex, float] | None:
-    """The same by bisection on all branches."""
+def _slow_crossing(
+    reduced: DenseProblem, passage: Passage, start: BranchState
+) -> tuple[tuple[float, complex, float] | None, bool]:
+    """The same by bisection on all branches, and whether the growth of the one is zero there."""
 
     def at(mu: float) -> BranchState:
         return Follower.resumed(reduced, start).advance(mu)
@@ -99,24 +101,22 @@ def _slow_crossing(reduced: DenseProblem, passage: Passage, start: BranchState) 
 
     mu = root_between(rate, passage.low, passage.high)
     if mu is None:
-        return None
+        return None, False
     state = at(mu)
     lam = complex(state.values[passage.branch])
     # Beside a motion as a whole what passes zero is known to the root of rounding alone.
-    if abs(lam) > AT_REST * reduced.frequency and _jumps(rate, mu, passage, ROUNDING * abs(lam)):
-        return None
-    return mu, 1j * lam.imag, float(state.tangents[passage.branch].real)
+    sure = abs(lam) <= AT_REST * reduced.frequency or abs(lam.real) <= ROUNDING * abs(lam)
+    if not sure and not _begins_among((at(passage.low), at(passage.high)), passage, lam):
+        return None, False
+    return (mu, 1j * lam.imag, float(state.tangents[passage.branch].real)), sure
 
 
-def _jumps(rate: Callable[[float], float], mu: float, passage: Passage, rounding: float) -> bool:
-    """Whether a growth rate jumps at its zero, as that of a branch that exchanges its name with another: nothing begins
-    or ends there. What is continuous changes less over less, beside a double root as well."""
-    scale = max(passage.high, 1e-3)
-    near, far = (
-        abs(rate(min(mu + part * scale, passage.high)) - rate(max(mu - part * scale, passage.low)))
-        for part in BESIDE
-    )
-    return near > max(0.5 * far, rounding)
+def _begins_among(ends: tuple[BranchState, BranchState], passage: Passage, lam: complex) -> bool:
+    """Whether of the modes about λ the fastest grows at one end of a passage alone. Where two exchange their names the
+    growth of either jumps over zero, and nothing begins or ends."""
+    reach = ABOUT * max(abs(complex(end.values[passage.branch]) - lam) for end in ends)
+    fastest = [float(end.found.values.real[np.abs(end.found.values - lam) <= reach].max()) for end in ends]
+    return (fastest[0] > ROUNDING * abs(lam)) != (fastest[1] > ROUNDING * abs(lam))
 
 
 def _by_growth(reduced: DenseProblem, passage: Passage) -> tuple[float, complex, float] | None:
