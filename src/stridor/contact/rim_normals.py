@@ -2,9 +2,10 @@
 
 A node at an end has facets on one side only. The average of their normals is that of a place half a facet inside, an
 offset d away across the edge; with the turn B of the normals of facets around it, n' = B d, the normal at the node is
-the average and B d. B is the least-squares fit to the normals of the facets at the node and of all that share a node
-with these, from their places in the tangent plane: Bd = Σ gᶠ nᶠ with Σ gᶠ = 0, so that on flat surfaces nothing
-changes.
+the average and B d. B is the least-squares fit to the normals of the facets at the node and of two rings about them,
+from their places in the tangent plane: Bd = Σ gᶠ nᶠ with Σ gᶠ = 0, so that on flat surfaces nothing changes. On
+spheres and cylinders normals are linear in these places. Where they are not, as where a flat ends beside a fillet, or
+facets are too uneven to tell, the fit leaves more than a share of what it would add, and nothing is added.
 """
 
 from __future__ import annotations
@@ -16,10 +17,11 @@ import scipy.sparse as sp
 
 from ..typing import Array, BoolArray, IntArray, Sparse
 
-STRIP = 0.2  # of the longest: a spread of centres below it tells no turn that way
-REACH = 1.0  # of the way between the outermost centres: how far beyond them normals are continued
-FAINT = 0.05  # of the largest turn around it: what is added to a normal and is left out
-STRAIGHT = 0.7  # cosine: edges of the end that go on in one direction
+STRIP = 0.2  # of the longest: a spread of places below it tells no turn that way
+REACH = 1.0  # of the way between the outermost places: how far beyond them normals are continued
+LEFT = 0.3  # of what is added to a normal: what the fit may leave of the normals it is made of
+HALF = 0.6  # of the largest turn about a node: what is added at most, half of it on even facets
+FLAT = 1e-9  # turn of normals about a facet that is none
 
 
 def rim_normals(
@@ -34,31 +36,72 @@ def rim_normals(
     """
     valid = facets >= 0
     blocked = valid & ((neighbours < 0) | sharp)
+    turn = np.where(valid, np.linalg.norm(smoothed[groups] - normals[:, None], axis=2), 0.0).max(axis=1)
+    places = _places(positions, facets)
+    # By group: from facets' places straight to their edges there that end the surface.
+    across = defaultdict[int, list[Array]](list)
     corners = valid.sum(axis=1)
-    centres = _places(positions, facets)
-    members, edges = defaultdict[int, set[int]](set), defaultdict[int, list[Array]](list)
-    at = dict[int, int]()
-    for f, edge in zip(*np.nonzero(blocked), strict=True):
+    for f, edge in zip(*np.nonzero(blocked & (turn > FLAT)[:, None] & linear[:, None]), strict=True):
         following = (int(edge) + 1) % int(corners[f])
-        along = positions[facets[f, following]] - positions[facets[f, edge]]
+        begin, end = positions[facets[f, edge]], positions[facets[f, following]]
+        along = (end - begin) / np.linalg.norm(end - begin)
+        way = begin - places[f] - along * (along @ (begin - places[f]))
         for corner in (int(edge), following):
-            group = int(groups[f, corner])
-            edges[group].append(along / np.linalg.norm(along))
-            at[group] = int(facets[f, corner])
-    for f, corner in zip(*np.nonzero(valid), strict=True):
-        members[int(groups[f, corner])].add(int(f))
+            across[int(groups[f, corner])].append(way)
+    if not across:
+        return sp.csr_array((int(groups.max()) + 1, len(facets)))
+    sheet = sp.csr_array(
+        (np.ones(int(valid.sum())), (np.nonzero(valid)[0], groups[valid])), shape=(len(facets), int(groups.max()) + 1)
+    )
+    at = sp.csr_array(sheet.T)
+    near = sp.csr_array(sheet @ at)  # facets that share a node
     rows, columns, values = list[int](), list[int](), list[float]()
-    for group in edges:
-        own = sorted(members[group])
-        patch = sorted(set().union(*(members[int(g)] for g in groups[own][valid[own]])))
+    for group, ways in across.items():
+        own = at.indices[at.indptr[group] : at.indptr[group + 1]]
+        ring = _about(near, own)
+        patch = _about(near, ring)
         if not linear[patch].all():
             continue
-        share = _continued(positions[at[group]], own, patch, edges[group], centres, normals, smoothed[group])
+        most = HALF * np.linalg.norm(normals[ring] - smoothed[group], axis=1).max()
+        share = _continued(_beyond(np.array(ways)), places[patch], normals[patch], smoothed[group], most)
         rows += [group] * len(patch)
-        columns += patch
+        columns += patch.tolist()
         values += share.tolist()
-    shape = int(groups.max()) + 1, len(facets)
-    return sp.csr_array((values, (rows, columns)), shape=shape)
+    return sp.csr_array((values, (rows, columns)), shape=(int(groups.max()) + 1, len(facets)))
+
+
+def _beyond(ways: Array) -> Array:
+    """The offset (3,) that goes as far beyond each edge as its way (e, 3): of a straight end their mean, at a corner
+    their sum."""
+    far = np.linalg.norm(ways, axis=1)
+    far = np.maximum(far, 1e-300)
+    offset: Array = np.linalg.lstsq(ways / far[:, None], far, rcond=STRIP)[0]
+    return offset
+
+
+def _about(near: Sparse, own: IntArray) -> IntArray:
+    """Facets that share a node with some."""
+    found: IntArray = np.unique(np.concatenate([near.indices[near.indptr[f] : near.indptr[f + 1]] for f in own]))
+    return found
+
+
+def _continued(offset: Array, places: Array, normals: Array, average: Array, most: float) -> Array:
+    """gᶠ (f,) of the facets of a patch, for a node that is ``offset`` beyond where the average is; none where more than
+    ``most`` would be added."""
+    nothing = np.zeros(len(places))
+    flat = np.eye(3) - np.outer(average, average)
+    offset = flat @ offset
+    centred = (places - places.mean(axis=0)) @ flat
+    _, spread, ways = np.linalg.svd(centred, full_matrices=False)
+    known = (spread > STRIP * spread[0]) & (np.abs(ways @ offset) <= REACH * np.ptp(centred @ ways.T, axis=0))
+    if not known.any():
+        return nothing
+    inverse = (ways[known].T / spread[known] ** 2) @ ways[known] @ centred.T
+    share: Array = offset @ inverse
+    turned = normals @ flat
+    left = turned - turned.mean(axis=0) - centred @ (inverse @ turned)
+    added = float(np.linalg.norm(share @ turned))
+    return share if np.sqrt(np.mean(np.sum(left**2, axis=1))) <= LEFT * added <= LEFT * most else nothing
 
 
 def _places(positions: Array, facets: IntArray) -> Array:
@@ -74,24 +117,3 @@ def _places(positions: Array, facets: IntArray) -> Array:
     circle = sum((share / total)[:, None] * corner for share, corner in zip(shares, (a, b, c), strict=True))
     places: Array = np.where(facets[:, 3:] < 0, circle, (a + b + c + last) / 4)
     return places
-
-
-def _continued(
-    node: Array, own: list[int], patch: list[int], edges: list[Array], centres: Array, normals: Array, average: Array
-) -> Array:
-    """gᶠ (f,) of the facets of a patch."""
-    flat = np.eye(3) - np.outer(average, average)
-    offset = flat @ (node - centres[own].mean(axis=0))
-    first = edges[0]
-    if all(abs(float(first @ edge)) >= STRAIGHT for edge in edges):
-        # Along an end that goes on both sides are there.
-        along = flat @ np.sum([edge * np.sign(first @ edge) for edge in edges], axis=0)
-        along /= max(float(np.linalg.norm(along)), 1e-300)
-        offset = offset - along * (along @ offset)
-    places = (centres[patch] - centres[patch].mean(axis=0)) @ flat
-    _, spread, ways = np.linalg.svd(places, full_matrices=False)
-    known = (spread > STRIP * spread[0]) & (np.abs(ways @ offset) <= REACH * np.ptp(places @ ways.T, axis=0))
-    if not known.any():
-        return np.zeros(len(patch))
-    inverse = (ways[known].T / spread[known] ** 2) @ ways[known] @ places.T
-    return offset @ inverse
