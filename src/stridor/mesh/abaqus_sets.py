@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from ..errors import CaseError
 from ..typing import Array, IntArray
 from .abaqus_deck import DeckLine
 from .abaqus_parts import ACCEPTED_TYPES, NamedSet, Scope, SurfaceCard
@@ -98,10 +99,16 @@ class Collector:
         return f"{self._bodies[body].name}.{name}" if taken or len(self._instances) > 1 else name
 
     def _turned(self) -> IntArray:
-        """Nodes, numbered through, whose freedoms *TRANSFORM puts along axes of their own."""
+        """Nodes, numbered through, whose freedoms *TRANSFORM puts along axes of their own: all, where the set that it
+        names is not known, as a mesh alone needs none of it."""
         cards = [(b, card) for b, scope in enumerate(self._bodies) for card in scope.transforms]
-        parts = [self._listed("NSET", b, card.line, [card.options["NSET"]], 0) for b, card in cards]
-        return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *parts]))
+        parts: list[IntArray] = [np.zeros(0, dtype=np.int64)]
+        for b, card in cards:
+            try:
+                parts.append(self._listed("NSET", b, card.line, [card.options["NSET"]], 0))
+            except CaseError:
+                return np.arange(len(self._points), dtype=np.int64)
+        return np.unique(np.concatenate(parts))
 
     def _by_kind(self, elements: IntArray) -> dict[str, IntArray]:
         """Elements, numbered through, as rows of the cells of each kind."""

@@ -19,6 +19,7 @@ from .quadratic import Quadratic
 from .quadratic.inverse_iteration import solved_beside
 from .results import ComplexModes
 
+MIRRORED = " Nothing dissipates: each motion that diverges has a mirror that decays as fast, which is not listed."
 ROWS = 5  # friction coefficients up to which every one is checked, of more the ends and the case's own
 
 
@@ -72,7 +73,8 @@ def checked_modes(
                     system, growing, max_frequency_hz, touching_at=touching, damped=modes.damped, options=options
                 )
             modes, lacked = _with_decaying(modes, row, decaying, growing.top)
-            told[row] += f" {_of_decaying(decaying, lacked, max_frequency_hz)}"
+            mirrored = decaying is not None and decaying.mirrored
+            told[row] += f" {_of_decaying(decaying, lacked, max_frequency_hz)}{MIRRORED if mirrored else ''}"
     return replace(modes, completeness=tuple(told))
 
 

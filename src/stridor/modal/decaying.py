@@ -29,13 +29,15 @@ NEAR = 1e-5  # of the band: eigenvalues further apart are not the same mode
 @dataclass(frozen=True)
 class Decaying:
     """Modes of a band that do not grow: λ (k,) [1/s], right (n, k) of unit norm, left (n, k) with yᵀP(λ) = 0, backward
-    errors residual (k,). slower [1/s]: up to which decay they were sought."""
+    errors residual (k,). slower [1/s]: up to which decay they were sought. mirrored: whether mirrors of what diverges
+    are left out, as where nothing dissipates."""
 
     values: ComplexArray
     right: ComplexArray
     left: ComplexArray
     residual: Array
     slower: float
+    mirrored: bool
 
 
 @one_thread
@@ -61,7 +63,8 @@ def decaying_modes(
     size = np.abs(found.values)
     inside = (found.values.imag <= 2 * np.pi * max_frequency_hz) & (size > growing.still)
     # Without damping what decays without oscillating is the mirror of what diverges, which is listed.
-    inside &= problem.damped | (found.values.imag > 0.0)
+    mirrors = inside & (found.values.imag == 0.0) & (found.values.real < 0.0) & (not problem.damped)
+    inside &= ~mirrors
     # Growth that the other search takes for rounding is none here, either.
     near, _ = pairs(found.values, growing.values, NEAR * growing.top)
     inside[near] = False
@@ -69,7 +72,7 @@ def decaying_modes(
     n = problem.size
     return Decaying(
         found.values[inside], _unit(found.right[:n, inside]), _unit(found.left[:n, inside]), found.residual[inside],
-        slower,
+        slower, bool(mirrors.any()),
     )  # fmt: skip
 
 

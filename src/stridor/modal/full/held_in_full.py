@@ -8,7 +8,7 @@ must be one of the model's, and each of the model's one of these.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -80,7 +80,9 @@ def held_in_full(
 def _words(found: Growing, listed: Listed) -> str:
     """In what the full problem differs at a point."""
     # Motions as a whole are told apart by their size.
-    judged = np.abs(listed.values) > found.still
+    judged = (np.abs(listed.values) > found.still) & (np.abs(listed.values) <= found.top)
+    # What diverges faster than anything of the band turns no model promises.
+    found = replace(found, values=found.values[np.abs(found.values) <= found.top])
     values, grows = listed.values[judged], listed.grows[judged]
     lacks = found.values[missing(found, values, grows)]
     more = unconfirmed(found, values, grows)

@@ -271,6 +271,8 @@ def onsets_along(
         complete, said = False, f"Not confirmed in the full problem and left out: {parameter} = {lost}. {said}"
     if held is not None and where:
         said = _with_full(said, held, parameter, line)
+    elif where:
+        said = f"{UNCHECKED} in the full problem: what grows is what the model has. {said}"
     # Of a mode with other nodes in contact nothing was sought.
     others = unlike_along(model, parameter, point)
     if others:
