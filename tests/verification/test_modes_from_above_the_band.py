@@ -106,7 +106,7 @@ def test_onsets_on_a_model_without_it_are_not_complete(monkeypatch: pytest.Monke
     found = case_onsets(block(), DAMPING, (0.0, 2000.0))
     assert (len(found), found.complete) == (0, False)
     # A motion without oscillation grows on that model alone.
-    lacking = "in the full problem 1 mode grows and in the reduced model 0, which lacks 2"
+    lacking = "in the full problem 1 mode grows and in the reduced model 1, which lacks 2"
     assert found.sentence.startswith(f"Not complete: {lacking}")
     assert f"at {DAMPING} = 0; in the full problem no mode grows and in the reduced model 1" in found.sentence
     assert f"at {DAMPING} = 2000. On the model: in the reduced model 1 mode grows" in found.sentence

@@ -80,12 +80,14 @@ def held_in_full(
 def _words(found: Growing, listed: Listed) -> str:
     """In what the full problem differs at a point."""
     # Motions as a whole are told apart by their size.
-    judged = (np.abs(listed.values) > found.still) & (np.abs(listed.values) <= found.top)
-    # What diverges faster than anything of the band turns no model promises.
-    found = replace(found, values=found.values[np.abs(found.values) <= found.top])
+    judged = np.abs(listed.values) > found.still
     values, grows = listed.values[judged], listed.grows[judged]
-    lacks = found.values[missing(found, values, grows)]
-    more = unconfirmed(found, values, grows)
+    # What diverges faster than anything of the band turns no model promises: it is held by its number alone.
+    inside, within = np.abs(found.values) <= found.top, np.abs(values) <= found.top
+    band = replace(found, values=found.values[inside])
+    lacks = band.values[missing(band, values[within], grows[within])]
+    beyond = int(np.count_nonzero(grows & ~within)) - int(np.count_nonzero(~inside))
+    more = unconfirmed(band, values[within], grows[within]) + max(beyond, 0)
     counts = f"in the full problem {modes_grow(found.values)} and in the reduced model {int(np.count_nonzero(grows))}"
     if len(lacks):
         named = ", ".join(f"{hertz(abs(v.imag) / (2 * np.pi))} (+{v.real:.4g} 1/s)" for v in lacks[:MOST])
