@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -55,6 +56,35 @@ def test_models_that_differ_disagree_whatever_the_step(coupled: Case, monkeypatc
     found = st.compare(coupled, [0.9])
     assert found.agree is False
     assert "the step" not in found.verdict
+
+
+OTHER = {
+    "changes with every step": lambda k: 1.5 + 0.5 * (-1) ** k,
+    "comes right at a quarter": lambda k: (1.4, 1.2, 1.0)[min(k, 2)],
+    "is not told with half": lambda k: None if k == 1 else 1.4,
+}
+
+
+@pytest.mark.parametrize("how", OTHER)
+def test_a_motion_that_changes_with_its_step_decides_nothing(coupled: Case, monkeypatch, how: str):
+    """Another frequency in time than the mode's; ``k`` halvings of the step."""
+    from stridor.agreement import comparison
+
+    march, coarse = comparison.perturb, list[float]()
+
+    def wrong(system, mu, *, settings, **rest):
+        found = march(system, mu, settings=settings, **rest)
+        coarse[:] = coarse or [settings.step or comparison.perturbation_step(system, settings)]
+        halvings = round(math.log2(coarse[0] / settings.step)) if settings.step else 0
+        factor = OTHER[how](halvings)
+        told = {"untold": "it is too short"} if factor is None else {"eigenvalue": found.eigenvalue * factor}
+        return replace(found, **told)
+
+    monkeypatch.setattr(comparison, "perturb", wrong)
+    found = st.compare(coupled, [0.8], only=["growth"])
+    (one,) = found.comparisons
+    assert one.agrees is None
+    assert "the step parts them, take temporal.step = " in one.verdict
 
 
 def test_growth_in_another_shape_is_not_agreement(coupled: Case, monkeypatch):

@@ -36,7 +36,7 @@ from .kept import PartStore, Plain, float_of, growth_data, growth_of, pair_of, p
 from .pairs import TOGETHER
 from .partner import Partner, partner_of
 from .perturbation import modes_as_in_time, perturb, perturbation_step
-from .result import NEAR, Agreement, Comparison, Critical, decays_as_none, judge, likeness, overall
+from .result import NEAR, NO_VIBRATION, Agreement, Comparison, Critical, decays_as_none, judge, likeness, overall
 from .settled import SettledVelocity, last_rate, settled_of, settled_velocity
 from .shapes import by_body, mode_shape, span_assurance
 from .small_motion import Perturbation, whole
@@ -44,7 +44,9 @@ from .small_motion import Perturbation, whole
 T = TypeVar("T")
 PARTS = ("growth", "run", "critical")
 LEAST_PERIODS = 4.0  # of the dominant line, over which growth is fitted
-HALVED = 0.5  # of a difference: what half the step may leave of it where it comes of the step
+HALVINGS = 3  # of the step, where both disagree
+SETTLED = 0.25  # of the difference of both: what a halving may change in time where it does not come of the step
+ENOUGH = 40  # steps to the period that a difference must hold with
 
 
 def _silent(text: str) -> None:
@@ -277,58 +279,87 @@ class _At:
             partner = Partner(int(unstable[lam[unstable].imag == 0.0][0]), unstable=True)
         else:
             partner = partner_of(lam, unstable, perturbation)
-        here = complex(lam[partner.column])
-        frequency = abs(perturbation.eigenvalue.imag - here.imag) / max(abs(here.imag), 1e-300)
-        rate = abs(perturbation.eigenvalue.real - here.real) / max(abs(here.real), 1e-300)
-        told = modes.completeness[0]
-        assert modes.right is not None, "asked for with vectors"
-        alike = np.flatnonzero(_alike(lam, here))
-        shape = None if perturbation.shape is None else perturbation.shape.likeness(modes.right[0, alike])
-        bodies = bool(self.about.lines or self.about.solids)
-        agrees, verdict = judge(
-            mu, partner.unstable, here, perturbation, frequency, rate, told, shape, shape_asked=bodies,
-            last=None if len(unstable) else _last(modes, self.limit), rival=partner.rival, hidden=partner.hidden,
-        )  # fmt: skip
-        # Beside a double root a step moves the roots of what it marches by the root of its error.
-        foreign = agrees is None and decays_as_none(perturbation, frequency, rate) and not partner.unstable
-        if (agrees is False or foreign) and not diverges:
-            verdict, agrees = self._resolved(mu, here, perturbation, verdict, own, agrees)
+        one = self._judged(mu, modes, unstable, perturbation, partner)
+        verdict, agrees = one.verdict, one.agrees
+        faster = complex(lam[unstable[0]]) if diverges else 0j
+        if faster.imag:
+            vibration = f"{readable(faster.imag / (2 * np.pi), 5)} Hz with {readable(faster.real, 4)} 1/s"
+            beside = f"beside the fastest mode, {vibration}, which is not held against a motion in time there"
+            verdict = verdict.replace(NO_VIBRATION, beside)
+        if one.open_to_steps and not diverges:
+            verdict, agrees = self._resolved(mu, modes, unstable, perturbation, one, own)
         return Comparison(
             mu=mu,
-            modal_eigenvalue=here,
+            modal_eigenvalue=one.here,
             unstable_hz=tuple(float(f) for f in modes.frequency_hz[0][unstable]),
             unstable_growth=tuple(float(g) for g in modes.growth_rate[0][unstable]),
             perturbation=perturbation,
             dominant_frequency_hz=None,
             run_growth=None,
-            frequency_error=float(frequency),
-            growth_rate_error=float(rate),
+            frequency_error=float(one.frequency),
+            growth_rate_error=float(one.rate),
             mac=None,
             responding=None,
             agrees=agrees,
             verdict=verdict,
-            growth_mac=shape,
-            completeness=told,
+            growth_mac=one.shape,
+            completeness=modes.completeness[0],
         )
 
+    def _judged(
+        self, mu: float, modes: ComplexModes, unstable: IntArray, perturbation: Perturbation, partner: Partner
+    ) -> _Judged:
+        """What a perturbation in time is held against, how far both are apart, and the verdict."""
+        lam = modes.eigenvalues[0]
+        here = complex(lam[partner.column])
+        frequency = abs(perturbation.eigenvalue.imag - here.imag) / max(abs(here.imag), 1e-300)
+        rate = abs(perturbation.eigenvalue.real - here.real) / max(abs(here.real), 1e-300)
+        assert modes.right is not None, "asked for with vectors"
+        alike = np.flatnonzero(_alike(lam, here))
+        shape = None if perturbation.shape is None else perturbation.shape.likeness(modes.right[0, alike])
+        agrees, verdict = judge(
+            mu, partner.unstable, here, perturbation, frequency, rate, modes.completeness[0], shape,
+            shape_asked=bool(self.about.lines or self.about.solids),
+            last=None if len(unstable) else _last(modes, self.limit), rival=partner.rival, hidden=partner.hidden,
+        )  # fmt: skip
+        # Beside a double root a step moves the roots of what it marches by the root of its error.
+        foreign = agrees is None and decays_as_none(perturbation, frequency, rate) and not partner.unstable
+        return _Judged(here, frequency, rate, shape, agrees, verdict, agrees is False or foreign)
+
     def _resolved(
-        self, mu: float, here: complex, coarse: Perturbation, verdict: str, modes: ComplexModes | None,
-        agrees: bool | None,
+        self, mu: float, modes: ComplexModes, unstable: IntArray, coarse: Perturbation, first: _Judged,
+        own: ComplexModes | None,
     ) -> tuple[str, bool | None]:  # fmt: skip
-        """A verdict that both disagree, or that what decays in time is no mode, held against half the time step: where
-        that takes half of the difference away, the step parts them, and nothing is decided."""
+        """A verdict that both disagree, or that what decays in time is no mode, with shorter steps. It stands where the
+        motion in time no longer changes with the step, of enough steps to the period, and differs all the same; else
+        the step parts both, and nothing is decided."""
         step = perturbation_step(self.about, self.settings)
-        finer = replace(self.settings, step=step / 2)
-        try:
-            fine = perturb(self.about, mu, settings=finer, max_frequency_hz=self.limit, modes=modes)
-        except AnalysisError:
-            return verdict, agrees
-        if not fine.shows or abs(fine.eigenvalue - here) > HALVED * abs(coarse.eigenvalue - here):
-            return verdict, agrees
-        return (
-            f"{verdict}; with half the step of {step:.4g} s growth in time is {readable(fine.growth_rate, 4)} 1/s of "
-            f"{readable(here.real, 4)}: the step parts them, take temporal.step = {step / 8:.2g} or less"
-        ), None
+        before, one, told = coarse, first, ""
+        for halvings in range(1, HALVINGS + 1):
+            finer = replace(self.settings, step=step / 2**halvings)
+            try:
+                fine = perturb(self.about, mu, settings=finer, max_frequency_hz=self.limit, modes=own, shape=True)
+            except AnalysisError as error:
+                told = f"with steps of {step / 2**halvings:.3g} s nothing is told ({error})"
+                break
+            if not fine.shows or fine.untold:
+                told = f"with steps of {step / 2**halvings:.3g} s growth in time is not told"
+                break
+            one = self._judged(mu, modes, unstable, fine, partner_of(modes.eigenvalues[0], unstable, fine))
+            told = (
+                f"with steps of {step / 2**halvings:.3g} s growth in time is {readable(fine.growth_rate, 4)} 1/s of "
+                f"{readable(one.here.real, 4)}"
+            )
+            if not one.open_to_steps:
+                break
+            apart = abs(fine.eigenvalue - one.here)
+            turns = 2 * np.pi / (step / 2**halvings * max(abs(fine.eigenvalue), abs(one.here), 1e-300))
+            if abs(fine.eigenvalue - before.eigenvalue) <= SETTLED * apart and turns >= ENOUGH:
+                return first.verdict, first.agrees
+            before = fine
+        last = max(abs(before.eigenvalue), abs(one.here), 1e-300)
+        least = min(step / 8, 2 * np.pi / (2 * ENOUGH * last))
+        return f"{first.verdict}; {told}: the step parts them, take temporal.step = {least:.2g} or less", None
 
     def _answer(self, mu: float, run: Trajectory, modes: ComplexModes) -> _Answer:
         dominant, fitted = dominant_response(run, self.limit)
@@ -365,6 +396,20 @@ class _At:
     def _keep(self, part: str, mu: float, data: Plain) -> None:
         if self.kept is not None:
             self.kept.put(part, mu, data)
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """A perturbation in time beside the mode it is held against: λ of that, by which shares frequency and rate are
+    apart, likeness, agreement, verdict; open_to_steps: whether shorter steps may say otherwise."""
+
+    here: complex
+    frequency: float
+    rate: float
+    shape: float | None
+    agrees: bool | None
+    verdict: str
+    open_to_steps: bool
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 SAME_DECAY = 0.25
 TURNS = 3.0  # periods of a mode that a signal must hold to tell its rate
 GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, GOOD_CRITICAL = 0.01, 0.05, 0.8, 0.03
+NO_VIBRATION = "so that there is no small vibration to compare"
 NEAR = 0.05  # of the frequency of a full run: an unstable mode within it responds
 AGREE, DISAGREE, UNDECIDED = "agree: ", "disagree: ", "not decided: "
 
@@ -70,8 +71,9 @@ class Comparison(Shown):
 
     @property
     def marched(self) -> bool:
-        """Whether a small perturbation was marched: not about what diverges without oscillating."""
-        return not (self.unstable_hz and self.modal_eigenvalue.imag == 0.0)
+        """Whether a small perturbation was marched and shows a vibration: not about what diverges without oscillating,
+        nor where it leaves the linear range at once."""
+        return self.perturbation.shows and not (self.unstable_hz and self.modal_eigenvalue.imag == 0.0)
 
     @property
     def told_growth_error(self) -> float | None:
@@ -278,8 +280,8 @@ def _judged(
     """The same for modes that are certain."""
     if unstable and here.imag == 0.0:
         return None, (
-            f"μ = {mu:g}: by the modes the motion diverges without oscillating, at {readable(here.real)} 1/s, so that "
-            "there is no small vibration to compare"
+            f"μ = {mu:g}: by the modes the motion diverges without oscillating, at {readable(here.real)} 1/s, "
+            f"{NO_VIBRATION}"
         )
     said = "unstable" if unstable else "stable"
     if not perturbation.shows:
