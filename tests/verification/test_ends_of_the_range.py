@@ -107,9 +107,10 @@ def test_onsets_that_do_not_account_for_what_grows_are_not_called_complete(block
         assert LEFT not in told.completeness
 
 
-def test_nor_are_those_that_account_for_it_at_no_value_between() -> None:
+def test_nor_are_those_that_do_not_account_for_it_at_a_value_between() -> None:
     assert Between(11, odd=11).amiss
-    assert not Between(11, odd=10).amiss
+    assert Between(11, odd=1).amiss
+    assert not Between(11).amiss
     assert not Between(0).amiss
 
 

@@ -168,7 +168,7 @@ def test_damped_modes_that_pass_each_other_grow_in_between(seeds: range, source:
     assert whole >= 0.9 * len(seeds)
 
 
-@pytest.mark.parametrize("weak", [1e-8, 1e-9, 1e-10, 1e-11, 1e-12])
+@pytest.mark.parametrize("weak", [1e-8, 1e-9, 1e-11])
 @pytest.mark.parametrize("decay", [0.3, 0.9])
 def test_one_beside_modes_that_are_one(weak: float, decay: float) -> None:
     """Two more contacts see modes of one frequency, which the receptance does not tell apart: the full problem is

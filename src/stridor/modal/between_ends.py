@@ -119,7 +119,10 @@ def _as_said(found: Onsets, start: Growing, mu: float, roots: int, more: int = 0
         said = growing_roots(start.values) + inside
         least, most = said - sum(up for _, up in over), said - sum(low for low, _ in over)
     # Rounding decides whether what begins or ends at the low end itself grows there.
-    there = [o.roots for o in found.onsets if abs(o.mu - found.friction_range[0]) <= AT_ONSET * found.friction_range[1]]
+    low, high = found.friction_range
+    # What grows as slowly as motions as a whole may be is not sought beside them.
+    slow = 2 * start.still / (2 * np.pi)
+    there = [o.roots for o in found.onsets if abs(o.mu - low) <= AT_ONSET * high or 0.0 < o.frequency_hz <= slow]
     return least - sum(r for r in there if r > 0) <= roots <= most + more - sum(r for r in there if r < 0)
 
 

@@ -26,6 +26,7 @@ from .from_above import WIDER, Returning, with_origins
 from .full import full_onsets
 from .full.basis import DENSE as SMALL
 from .full.basis import WHOLE
+from .full.words import UNFOLLOWED
 from .growing import UNCHECKED, affordable, growing_modes
 from .joined import TouchingChange, joined_modes, joined_onsets, rows_of
 from .krylov import Carried
@@ -242,7 +243,7 @@ def _solved_onsets(
             if held.size <= SMALL:  # followed at once: a count may miss what begins and ends between two values
                 with suppress(AnalysisError):
                     found = unfollowed(held, between, None)
-                    if found.complete:
+                    if found.complete and UNFOLLOWED not in found.completeness:
                         return found
             return unfollowed(held, between, why)
         if not found.completeness:

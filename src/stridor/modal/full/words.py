@@ -17,6 +17,7 @@ from .family import Family
 from .growth import growing_roots, unstable
 from .search import SMALL, Answer
 
+UNFOLLOWED = "branches not followed"
 MOST = 4  # places that are named one by one
 BARELY = 1e-4  # of the highest frequency: what is no faster may be the one that begins or ends
 
@@ -49,10 +50,10 @@ def sentence(
         if answer.walked:
             return (
                 f"{how}: {numbers}.{passing} Onsets were sought along the imaginary axis, at {answer.walked} "
-                f"frequencies up to {top / (2 * np.pi):g} Hz, and branches not followed{why}."
+                f"frequencies up to {top / (2 * np.pi):g} Hz, and {UNFOLLOWED}{why}."
             )
         return (
-            f"{how}: {numbers}.{passing} Onsets were enclosed by that count, and branches not followed{why}; growth "
+            f"{how}: {numbers}.{passing} Onsets were enclosed by that count, and {UNFOLLOWED}{why}; growth "
             "that begins and ends again, or ends and begins, between two of these values may be missing."
         )
     said = f"as the onsets say{_across(family, answer, ends, top)}"
