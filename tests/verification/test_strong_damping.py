@@ -10,6 +10,7 @@ import pytest
 import stridor as st
 from benches import paper_case
 from stridor.errors import FollowingError
+from stridor.modal import over_friction
 from stridor.modal import source as following
 from stridor.modal.krylov.problem import problem_of
 from stridor.modal.options import Options
@@ -120,7 +121,7 @@ def test_onsets_without_branches(first: float, second: float, number: int, monke
     """As many modes grow at every μ of a grid as the onsets say."""
     case = bench(first, (6, 12)).with_({"bodies.beam2.damping.stiffness": second})
     monkeypatch.setattr(Tracker, "advance", lost)
-    monkeypatch.setattr(following, "SMALL", 0)  # smaller ones are followed in the full problem first
+    monkeypatch.setattr(over_friction, "SMALL", 0)  # smaller ones are followed in the full problem first
     found = st.onsets(case)
     assert found.complete
     assert "sought along the imaginary axis" in found.completeness
