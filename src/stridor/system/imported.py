@@ -290,9 +290,9 @@ def _check_axes(where: str, body: MatrixBody, mesh: Mesh, labels: Labels) -> Non
     *TRANSFORM makes u' = R u the freedoms of a node, so that Abaqus writes R K Rᵀ. Contacts, supports, springs and
     loads along x, y, z would act on u' as if it were u.
     """
-    assert mesh.numbers is not None, "read from an Abaqus file"
     if mesh.turned is None:
         return
+    assert mesh.numbers is not None, "read from an Abaqus file"
     moving = labels.node[(labels.direction >= 1) & (labels.direction <= body.dimension)]
     turned = np.intersect1d(mesh.numbers[mesh.turned], moving)
     if len(turned):
