@@ -98,7 +98,7 @@ def test_a_round_end_of_a_sphere_turns_out_by_half_a_ring(sectors: int) -> None:
     surface = FacetSurface.from_facets(points, {"quad": facets}, where="w")
     averaged = replace(surface, rim=sp.csr_array(surface.rim.shape))
     off = [
-        np.degrees(np.linalg.norm(np.cross(s.corner_normals(points)[-sectors:, 1], points[-sectors:] - 0), axis=1)).max()
+        np.degrees(np.linalg.norm(np.cross(s.corner_normals(points)[-sectors:, 1], points[-sectors:]), axis=1)).max()
         for s in (averaged, surface)
     ]
     assert off[1] < 0.35 * off[0]

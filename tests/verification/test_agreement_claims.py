@@ -58,6 +58,18 @@ def test_models_that_differ_disagree_whatever_the_step(coupled: Case, monkeypatc
     assert "the step" not in found.verdict
 
 
+def test_a_vibration_that_grows_faster_than_a_divergence_is_told_beside_it():
+    """Nothing is marched about what diverges; that there is no vibration is said where there is none."""
+    nothing = Perturbation(0.9, 0j, np.zeros(0), 1.0, Components(np.zeros(0, dtype=complex), np.zeros(0)))
+    alone = judge(0.9, True, 0.01 + 0j, nothing, 0.0, 0.0)
+    assert alone[0] is None
+    assert alone[1].endswith(" 1/s, so that there is no small vibration to compare")
+    beside = judge(0.9, True, 0.01 + 0j, nothing, 0.0, 0.0, faster=0.1 + 2j)
+    assert beside[0] is None
+    assert "beside the fastest mode, 0.31831 Hz with 0.1000 1/s, which is not held against" in beside[1]
+    assert "no small vibration" not in beside[1]
+
+
 OTHER = {
     "changes with every step": lambda k: 1.5 + 0.5 * (-1) ** k,
     "comes right at a quarter": lambda k: (1.4, 1.2, 1.0)[min(k, 2)],

@@ -36,7 +36,7 @@ from .kept import PartStore, Plain, float_of, growth_data, growth_of, pair_of, p
 from .pairs import TOGETHER
 from .partner import Partner, partner_of
 from .perturbation import modes_as_in_time, perturb, perturbation_step
-from .result import NEAR, NO_VIBRATION, Agreement, Comparison, Critical, decays_as_none, judge, likeness, overall
+from .result import NEAR, Agreement, Comparison, Critical, decays_as_none, judge, likeness, overall
 from .settled import SettledVelocity, last_rate, settled_of, settled_velocity
 from .shapes import by_body, mode_shape, span_assurance
 from .small_motion import Perturbation, whole
@@ -279,13 +279,9 @@ class _At:
             partner = Partner(int(unstable[lam[unstable].imag == 0.0][0]), unstable=True)
         else:
             partner = partner_of(lam, unstable, perturbation)
-        one = self._judged(mu, modes, unstable, perturbation, partner)
+        fastest = complex(lam[unstable[0]]) if diverges else 0j
+        one = self._judged(mu, modes, unstable, perturbation, partner, fastest if fastest.imag else None)
         verdict, agrees = one.verdict, one.agrees
-        faster = complex(lam[unstable[0]]) if diverges else 0j
-        if faster.imag:
-            vibration = f"{readable(faster.imag / (2 * np.pi), 5)} Hz with {readable(faster.real, 4)} 1/s"
-            beside = f"beside the fastest mode, {vibration}, which is not held against a motion in time there"
-            verdict = verdict.replace(NO_VIBRATION, beside)
         if one.open_to_steps and not diverges:
             verdict, agrees = self._resolved(mu, modes, unstable, perturbation, one, own)
         return Comparison(
@@ -307,9 +303,10 @@ class _At:
         )
 
     def _judged(
-        self, mu: float, modes: ComplexModes, unstable: IntArray, perturbation: Perturbation, partner: Partner
-    ) -> _Judged:
-        """What a perturbation in time is held against, how far both are apart, and the verdict."""
+        self, mu: float, modes: ComplexModes, unstable: IntArray, perturbation: Perturbation, partner: Partner,
+        faster: complex | None = None,
+    ) -> _Judged:  # fmt: skip
+        """What a perturbation in time is held against, how far both are apart, and the verdict (`judge`)."""
         lam = modes.eigenvalues[0]
         here = complex(lam[partner.column])
         frequency = abs(perturbation.eigenvalue.imag - here.imag) / max(abs(here.imag), 1e-300)
@@ -321,6 +318,7 @@ class _At:
             mu, partner.unstable, here, perturbation, frequency, rate, modes.completeness[0], shape,
             shape_asked=bool(self.about.lines or self.about.solids),
             last=None if len(unstable) else _last(modes, self.limit), rival=partner.rival, hidden=partner.hidden,
+            faster=faster,
         )  # fmt: skip
         # Beside a double root a step moves the roots of what it marches by the root of its error.
         foreign = agrees is None and decays_as_none(perturbation, frequency, rate) and not partner.unstable

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 SAME_DECAY = 0.25
 TURNS = 3.0  # periods of a mode that a signal must hold to tell its rate
 GOOD_FREQUENCY, GOOD_GROWTH, GOOD_MAC, GOOD_CRITICAL = 0.01, 0.05, 0.8, 0.03
-NO_VIBRATION = "so that there is no small vibration to compare"
 NEAR = 0.05  # of the frequency of a full run: an unstable mode within it responds
 AGREE, DISAGREE, UNDECIDED = "agree: ", "disagree: ", "not decided: "
 
@@ -243,13 +242,15 @@ def judge(
     last: complex | None = None,
     rival: complex | None = None,
     hidden: complex | None = None,
+    faster: complex | None = None,
 ) -> tuple[bool | None, str]:
     """Whether both approaches agree at one μ, None where the signal shows nothing or tells no components apart, where
     what grows has another shape (MAC, None where it was not taken or, if asked for, not told) and where the modes are
     not borne out (``completeness``), and the sentence that says it. last: the mode that dies out last, which contacts
     may not show, or the step may damp. rival: one that grows as fast as ``here``. hidden: one that grows, faster than
-    all that contacts show, which ``unstable`` is about: then nothing agrees."""
-    agrees, sentence = _judged(mu, unstable, here, perturbation, frequency, rate)
+    all that contacts show, which ``unstable`` is about: then nothing agrees. faster: a vibration that grows faster than
+    ``here``, which diverges."""
+    agrees, sentence = _judged(mu, unstable, here, perturbation, frequency, rate, faster)
     if agrees is False and perturbation.untold:
         said = "unstable" if unstable else "stable"
         agrees, sentence = None, f"μ = {mu:g}: modal says {said}, but {perturbation.untold}"
@@ -275,14 +276,16 @@ def judge(
 
 
 def _judged(
-    mu: float, unstable: bool, here: complex, perturbation: Perturbation, frequency: float, rate: float
-) -> tuple[bool | None, str]:
+    mu: float, unstable: bool, here: complex, perturbation: Perturbation, frequency: float, rate: float,
+    faster: complex | None,
+) -> tuple[bool | None, str]:  # fmt: skip
     """The same for modes that are certain."""
     if unstable and here.imag == 0.0:
-        return None, (
-            f"μ = {mu:g}: by the modes the motion diverges without oscillating, at {readable(here.real)} 1/s, "
-            f"{NO_VIBRATION}"
-        )
+        beside = "so that there is no small vibration to compare"
+        if faster is not None:
+            beside = f"beside the fastest mode, {_vibration(faster)}, which is not held against a motion in time there"
+        diverges = f"by the modes the motion diverges without oscillating, at {readable(here.real)} 1/s"
+        return None, f"μ = {mu:g}: {diverges}, {beside}"
     said = "unstable" if unstable else "stable"
     if not perturbation.shows:
         why = perturbation.untold or "the signal in time shows no vibration to compare with"
